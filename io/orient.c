@@ -5,9 +5,8 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
-#include "core/geometry/vector.h"
-
-/* Half-edge 3 * t + k goes from corner k to corner (k + 1) % 3 of triangle t. */
+#include "core/geometry/half_edges.h"
+#include "core/geometry/triangle.h"
 
 #define NONE UINT32_MAX
 
@@ -27,61 +26,17 @@ typedef struct work {
   const uint32_t *triangles;
   size_t vertex_count, triangle_count;
   double low[3], size; /* low corner and longest side of the bounding box, halved */
-  uint32_t *order;     /* half-edges sorted by edge */
-  uint32_t *mate;      /* per half-edge: the other one of an edge with two triangles, else NONE */
-  uint32_t *piece_of;  /* per triangle */
-  uint8_t *turned;     /* per triangle: 1 if it will be flipped */
-  piece *pieces;       /* grown on the heap */
+  qmat_half_edges edges;
+  uint32_t *mate;     /* per half-edge: the other one of an edge with two triangles, else NONE */
+  uint32_t *piece_of; /* per triangle */
+  uint8_t *turned;    /* per triangle: 1 if it will be flipped */
+  piece *pieces;      /* grown on the heap */
   size_t piece_count, piece_capacity;
 } work;
 
-static uint32_t start_of(const work *w, uint32_t half_edge) {
-  return w->triangles[half_edge];
-}
-
-static uint32_t end_of(const work *w, uint32_t half_edge) {
-  return w->triangles[half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1];
-}
-
-static uint32_t low_end(const work *w, uint32_t half_edge) {
-  uint32_t a = start_of(w, half_edge), b = end_of(w, half_edge);
-  return a < b ? a : b;
-}
-
-static uint32_t high_end(const work *w, uint32_t half_edge) {
-  uint32_t a = start_of(w, half_edge), b = end_of(w, half_edge);
-  return a < b ? b : a;
-}
-
-static bool same_edge(const work *w, uint32_t a, uint32_t b) {
-  return low_end(w, a) == low_end(w, b) && high_end(w, a) == high_end(w, b);
-}
-
 /* Whether the half-edge leads from its lower to its higher vertex once the triangles are flipped. */
 static bool runs_up(const work *w, uint32_t half_edge) {
-  return (start_of(w, half_edge) < end_of(w, half_edge)) != (w->turned[half_edge / 3] != 0);
-}
-
-/* The half-edges of one edge are order[first] to order[edge_end - 1]. */
-static size_t edge_end(const work *w, size_t first) {
-  size_t last = first + 1;
-  while (last < 3 * w->triangle_count && same_edge(w, w->order[first], w->order[last])) last++;
-  return last;
-}
-
-/* Two stable counting passes sort the half-edges by lower vertex, higher vertex and number. */
-static void sort_half_edges(work *w, uint32_t *swap, uint32_t *starts) {
-  size_t count = 3 * w->triangle_count;
-  for (int pass = 0; pass < 2; pass++) {
-    memset(starts, 0, (w->vertex_count + 1) * sizeof *starts);
-    for (uint32_t h = 0; h < count; h++) starts[(pass == 0 ? high_end(w, h) : low_end(w, h)) + 1]++;
-    for (size_t i = 0; i < w->vertex_count; i++) starts[i + 1] += starts[i];
-    if (pass == 0) {
-      for (uint32_t h = 0; h < count; h++) swap[starts[high_end(w, h)]++] = h;
-    } else {
-      for (size_t i = 0; i < count; i++) w->order[starts[low_end(w, swap[i])]++] = swap[i];
-    }
-  }
+  return qmat_half_edge_rises(&w->edges, half_edge) != (w->turned[half_edge / 3] != 0);
 }
 
 /* The position of a vertex in the unit box of the mesh. Halved numbers cannot overflow. */
@@ -122,7 +77,8 @@ static bool find_pieces(work *w, uint32_t *queue) {
         if (mate == NONE) continue;
         uint32_t other = mate / 3;
         /* Consistent triangles traverse their common edge in opposite directions. */
-        uint8_t wanted = (start_of(w, h) == start_of(w, mate)) != (w->turned[t] != 0);
+        uint8_t wanted =
+            (qmat_half_edge_start(&w->edges, h) == qmat_half_edge_start(&w->edges, mate)) != (w->turned[t] != 0);
         if (w->piece_of[other] == NONE) {
           w->piece_of[other] = number;
           w->turned[other] = wanted;
@@ -144,16 +100,17 @@ static bool find_pieces(work *w, uint32_t *queue) {
 static void find_borders(work *w, uint8_t *odd) {
   memset(odd, 0, w->piece_count);
   for (size_t first = 0, last; first < 3 * w->triangle_count; first = last) {
-    last = edge_end(w, first);
+    last = qmat_edge_last(&w->edges, first);
     if (last - first == 2) continue;
-    for (size_t i = first; i < last; i++) odd[w->piece_of[w->order[i] / 3]] ^= 1;
+    for (size_t i = first; i < last; i++) odd[w->piece_of[w->edges.order[i] / 3]] ^= 1;
     for (size_t i = first; i < last; i++) {
-      uint32_t number = w->piece_of[w->order[i] / 3];
+      uint32_t number = w->piece_of[w->edges.order[i] / 3];
       if (!odd[number]) continue;
       odd[number] = 0;
       piece *p = &w->pieces[number];
       p->open = true;
-      const uint32_t ends[2] = {low_end(w, w->order[i]), high_end(w, w->order[i])};
+      const uint32_t ends[2] = {qmat_half_edge_low(&w->edges, w->edges.order[i]),
+                                qmat_half_edge_high(&w->edges, w->edges.order[i])};
       for (size_t k = 0; k < 2; k++) {
         double point[3];
         local_point(w, ends[k], point);
@@ -164,21 +121,12 @@ static void find_borders(work *w, uint8_t *odd) {
   }
 }
 
-static double six_volumes(const double a[3], const double b[3], const double c[3], const double from[3]) {
-  double p[3], q[3], r[3], product[3];
-  qmat_subtract(a, from, p);
-  qmat_subtract(b, from, q);
-  qmat_subtract(c, from, r);
-  qmat_cross(q, r, product);
-  return qmat_dot(p, product);
-}
-
 static double triangle_volume(const work *w, size_t t, const double from[3]) {
   double a[3], b[3], c[3];
   local_point(w, w->triangles[3 * t], a);
   local_point(w, w->triangles[3 * t + 1], b);
   local_point(w, w->triangles[3 * t + 2], c);
-  double volume = six_volumes(a, b, c, from);
+  double volume = qmat_triangle_six_volumes(a, b, c, from);
   return w->turned[t] ? -volume : volume;
 }
 
@@ -236,9 +184,9 @@ static void count_all(const work *w, uint32_t *parents, uint8_t *open, double *v
     result->flipped += w->turned[t];
   }
   for (size_t first = 0, last; first < 3 * w->triangle_count; first = last) {
-    last = edge_end(w, first);
+    last = qmat_edge_last(&w->edges, first);
     size_t count = last - first, up = 0;
-    for (size_t i = first; i < last; i++) up += runs_up(w, w->order[i]);
+    for (size_t i = first; i < last; i++) up += runs_up(w, w->edges.order[i]);
     size_t apart = 2 * up > count ? 2 * up - count : count - 2 * up;
     edges++;
     if (count == 1) result->border_edges++;
@@ -246,7 +194,8 @@ static void count_all(const work *w, uint32_t *parents, uint8_t *open, double *v
     if (count % 2 != 0) result->closed = false;
     bool agrees = apart == count % 2;
     if (!agrees) result->oriented = false;
-    if (count % 2 != 0 || !agrees) open[qmat_set_leader(parents, low_end(w, w->order[first]))] = 1;
+    if (count % 2 != 0 || !agrees)
+      open[qmat_set_leader(parents, qmat_half_edge_low(&w->edges, w->edges.order[first]))] = 1;
   }
   for (size_t t = 0; t < w->triangle_count; t++) {
     uint32_t root = qmat_set_leader(parents, w->triangles[3 * t]);
@@ -264,32 +213,31 @@ static void count_all(const work *w, uint32_t *parents, uint8_t *open, double *v
 
 qmat_status qmat_orient_triangles(qmat_context *context, const double *positions, size_t vertex_count,
                                   uint32_t *triangles, size_t triangle_count, qmat_connectivity *connectivity) {
-  qmat_status status = QMAT_OK;
   *connectivity = (qmat_connectivity){0};
-  qmat_arena arena = {0}; /* separate, so that scratch memory is freed on return */
+  const qmat_arena aside = qmat_arena_set_aside(&context->arena); /* scratch memory is freed on return */
+  qmat_arena *arena = &context->arena;
   size_t half_edges = 3 * triangle_count;
   size_t rows = vertex_count + 2 > triangle_count ? vertex_count + 2 : triangle_count;
   work w = {.positions = positions,
             .triangles = triangles,
             .vertex_count = vertex_count,
             .triangle_count = triangle_count,
-            .order = qmat_arena_alloc(&arena, half_edges, sizeof(uint32_t)),
-            .mate = qmat_arena_alloc(&arena, half_edges, sizeof(uint32_t)),
-            .piece_of = qmat_arena_alloc(&arena, triangle_count, sizeof(uint32_t)),
-            .turned = qmat_arena_calloc(&arena, triangle_count, 1)};
-  uint32_t *scratch = qmat_arena_alloc(&arena, rows, sizeof *scratch);
-  uint8_t *flags = qmat_arena_alloc(&arena, rows, 1);
-  double *volumes = qmat_arena_alloc(&arena, vertex_count, sizeof *volumes);
-  if (!w.order || !w.mate || !w.piece_of || !w.turned || !scratch || !flags || !volumes) goto shortage;
+            .piece_of = qmat_arena_alloc(arena, triangle_count, sizeof(uint32_t)),
+            .turned = qmat_arena_calloc(arena, triangle_count, 1)};
+  uint32_t *scratch = qmat_arena_alloc(arena, rows, sizeof *scratch);
+  uint8_t *flags = qmat_arena_alloc(arena, rows, 1);
+  double *volumes = qmat_arena_alloc(arena, vertex_count, sizeof *volumes);
+  qmat_status status = qmat_half_edges_sort(context, vertex_count, triangle_count, triangles, &w.edges);
+  if (status != QMAT_OK || !w.piece_of || !w.turned || !scratch || !flags || !volumes) goto shortage;
 
   measure_box(&w);
-  sort_half_edges(&w, w.mate, scratch);
+  w.mate = w.edges.spare;
   memset(w.mate, 0xFF, half_edges * sizeof *w.mate);
   for (size_t first = 0, last; first < half_edges; first = last) {
-    last = edge_end(&w, first);
+    last = qmat_edge_last(&w.edges, first);
     if (last - first != 2) continue;
-    w.mate[w.order[first]] = w.order[first + 1];
-    w.mate[w.order[first + 1]] = w.order[first];
+    w.mate[w.edges.order[first]] = w.edges.order[first + 1];
+    w.mate[w.edges.order[first + 1]] = w.edges.order[first];
   }
   if (!find_pieces(&w, scratch)) goto shortage;
   find_borders(&w, flags);
@@ -309,6 +257,6 @@ shortage:
   status = qmat_fail_memory(context, "the edges of the mesh");
 done:
   qmat_free(w.pieces);
-  qmat_arena_uninit(&arena);
+  qmat_arena_put_back(&context->arena, aside);
   return status;
 }

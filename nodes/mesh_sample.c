@@ -198,15 +198,6 @@ static qmat_status check(qmat_context *context, const void *raw_params) {
   return qmat_fail_field(context, "spacing");
 }
 
-static qmat_status check_inputs(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness) {
-  if (thickness->domain != QMAT_PER_FACET || thickness->count != mesh->triangle_count) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu values per %s do not fit a mesh of %zu facets", thickness->count,
-              thickness->domain == QMAT_PER_FACET ? "facet" : "vertex", mesh->triangle_count);
-    return qmat_fail_field(context, "thickness");
-  }
-  return QMAT_OK;
-}
-
 /* The first samples are the vertices, each on the first facet that uses it. */
 static qmat_status sample_vertices(qmat_context *context, const qmat_mesh *mesh, qmat_samples *samples) {
   memcpy(samples->positions, mesh->positions, 3 * mesh->vertex_count * sizeof *samples->positions);
@@ -309,7 +300,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
     status = qmat_fail_memory(context, "the samples");
     goto done;
   }
-  status = check_inputs(context, mesh, thickness);
+  status = qmat_thickness_check_field(context, mesh, thickness);
   if (status == QMAT_OK) status = measure_areas(context, mesh, unit_positions, areas);
   if (status == QMAT_OK)
     status = count_samples(context, params, &solids, unit_positions, thickness, areas, offsets, &spaced, &counts);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/half_edges.h"
 #include "core/geometry/surface.h"
 #include "core/geometry/triangle.h"
 #include "core/json_text.h"
@@ -12,7 +13,6 @@
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/mesh/border_weld.h"
-#include "nodes/mesh/half_edges.h"
 #include "nodes/mesh/hole_cgal.h"
 #include "nodes/mesh/lend_joints.h"
 #include "nodes/mesh/overlaps.h"

@@ -38,6 +38,9 @@ size_t qmat_envelope_primitive_count(const qmat_envelope *envelope);
  * sphere. */
 int qmat_envelope_primitive(const qmat_envelope *envelope, size_t primitive, uint32_t ids[3]);
 
+/* What is measured by F more exactly than this is rounding. */
+#define QMAT_LEAST_ENVELOPE_TOLERANCE 1e-6
+
 /* F(point), where `point` is 3 doubles; INFINITY when there is no primitive. `primitive` (may be NULL) receives the
  * primitive that attains it. Cost: O(log n) for a point near the boundary when primitives overlap little. */
 double qmat_envelope_distance(const qmat_envelope *envelope, const double point[3], size_t *primitive);

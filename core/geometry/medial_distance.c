@@ -66,12 +66,6 @@ double qmat_cone_foot(const qmat_cone *cone, const double point[3], double weigh
   return distance;
 }
 
-double qmat_cone_distance(const double a[4], const double b[4], const double point[3]) {
-  qmat_cone cone;
-  qmat_cone_prepare(&cone, a, b);
-  return qmat_cone_prepared_distance(&cone, point);
-}
-
 static void edge_prepare(qmat_slab_edge *edge, const double a[2], double ra, const double b[2], double rb) {
   double d[2] = {b[0] - a[0], b[1] - a[1]}, length = sqrt(d[0] * d[0] + d[1] * d[1]), growth = rb - ra;
   if (!(length > fabs(growth)) || !(fabs(growth / length) < 1)) {
@@ -225,10 +219,4 @@ double qmat_slab_foot_below(const qmat_slab *slab, const double point[3], double
 
 double qmat_slab_foot(const qmat_slab *slab, const double point[3], double weights[3]) {
   return qmat_slab_foot_below(slab, point, INFINITY, weights);
-}
-
-double qmat_slab_distance(const double a[4], const double b[4], const double c[4], const double point[3]) {
-  qmat_slab slab;
-  qmat_slab_prepare(&slab, a, b, c);
-  return qmat_slab_prepared_distance(&slab, point);
 }

@@ -58,22 +58,16 @@ static inline double qmat_sphere_distance(const double sphere[4], const double p
   return sqrt(qmat_dot(d, d)) - sphere[3];
 }
 
-/* The signed distance to the cone of two spheres; their order does not matter, up to rounding. */
-double qmat_cone_distance(const double a[4], const double b[4], const double point[3]);
-
-/* The signed distance to the slab of three spheres; their order does not matter, up to rounding. */
-double qmat_slab_distance(const double a[4], const double b[4], const double c[4], const double point[3]);
-
 /* Fills `cone` from its two end spheres. */
 void qmat_cone_prepare(qmat_cone *cone, const double a[4], const double b[4]);
-/* The signed distance of a point to the cone. */
+/* The signed distance of a point to the cone. The order of the ends does not matter, up to rounding. */
 double qmat_cone_prepared_distance(const qmat_cone *cone, const double point[3]);
 /* The same distance, and the weights of the two ends (sum 1) at the medial point that attains it. */
 double qmat_cone_foot(const qmat_cone *cone, const double point[3], double weights[2]);
 
 /* Fills `slab` from its three corner spheres. */
 void qmat_slab_prepare(qmat_slab *slab, const double a[4], const double b[4], const double c[4]);
-/* The signed distance of a point to the slab. */
+/* The signed distance of a point to the slab. The order of the corners does not matter, up to rounding. */
 double qmat_slab_prepared_distance(const qmat_slab *slab, const double point[3]);
 /* The same distance, and the weights of the corners a, b, c (sum 1) at the medial point that attains it. */
 double qmat_slab_foot(const qmat_slab *slab, const double point[3], double weights[3]);

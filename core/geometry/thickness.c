@@ -5,13 +5,17 @@
 
 #include "core/geometry/sheets.h"
 
+qmat_status qmat_thickness_check_field(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness) {
+  if (thickness->domain == QMAT_PER_FACET && thickness->count == mesh->triangle_count) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu values per %s do not fit a mesh of %zu facets", thickness->count,
+            thickness->domain == QMAT_PER_FACET ? "facet" : "vertex", mesh->triangle_count);
+  return qmat_fail_field(context, "thickness");
+}
+
 qmat_status qmat_thickness_check(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
                                  const qmat_samples *samples) {
-  if (thickness->domain != QMAT_PER_FACET || thickness->count != mesh->triangle_count) {
-    qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu values per %s do not fit a mesh of %zu facets", thickness->count,
-              thickness->domain == QMAT_PER_FACET ? "facet" : "vertex", mesh->triangle_count);
-    return qmat_fail_field(context, "thickness");
-  }
+  const qmat_status status = qmat_thickness_check_field(context, mesh, thickness);
+  if (status != QMAT_OK) return status;
   if (samples->vertex_count != mesh->vertex_count) {
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "the samples were taken of a mesh with %zu vertices, not %zu",
               samples->vertex_count, mesh->vertex_count);

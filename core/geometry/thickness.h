@@ -4,6 +4,10 @@
 
 #include "core/value.h"
 
+/* Checks that the thickness has one value for each facet of this mesh. QMAT_ERROR_GEOMETRY names the field "thickness".
+ */
+qmat_status qmat_thickness_check_field(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness);
+
 /* Checks that the thickness (per facet) and the samples belong to this mesh: their counts match, every facet id exists,
  * and the first samples are the mesh's vertices. QMAT_ERROR_GEOMETRY names the field "thickness" or "samples". Cost:
  * linear. */

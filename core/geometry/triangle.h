@@ -36,6 +36,27 @@ static inline double qmat_triangle_area(const double a[3], const double b[3], co
   return degenerate ? 0 : 0.5 * length;
 }
 
+/* How far along a segment the place that is closest to a point is: from 0 at `a` to 1 at `b`; 0 without length. */
+static inline double qmat_closest_on_segment(const double point[3], const double a[3], const double b[3]) {
+  double ab[3], ap[3];
+  qmat_subtract(b, a, ab);
+  qmat_subtract(point, a, ap);
+  const double square = qmat_dot(ab, ab);
+  return square > 0 ? fmin(fmax(qmat_dot(ap, ab) / square, 0), 1) : 0;
+}
+
+/* Six times the volume of the tetrahedron between a triangle abc and a point `from` (3 doubles each): above 0 where the
+ * triangle runs counter-clockwise, seen from the other side. */
+static inline double qmat_triangle_six_volumes(const double a[3], const double b[3], const double c[3],
+                                               const double from[3]) {
+  double p[3], q[3], r[3], product[3];
+  qmat_subtract(a, from, p);
+  qmat_subtract(b, from, q);
+  qmat_subtract(c, from, r);
+  qmat_cross(q, r, product);
+  return qmat_dot(p, product);
+}
+
 /* The longest side of a triangle, from corner `base` to the next, and the height over it. */
 typedef struct qmat_longest_side {
   int base;
@@ -61,6 +82,24 @@ static inline qmat_longest_side qmat_triangle_longest_side(const double a[3], co
   }
   side.height = sqrt(fmax(square - along * along, 0));
   return side;
+}
+
+/* Halves a triangle at the middle of its longest side, the first of equal ones. `corners`, `low` and `high` are 3
+ * points of 3 doubles, one after the other: the middle takes the place of the side's second end in `low`, and of its
+ * first end in `high`. */
+static inline void qmat_triangle_halve(const double *corners, double *low, double *high) {
+  int a = 0;
+  double longest = -1;
+  for (int i = 0; i < 3; i++) {
+    const double length = qmat_point_distance(&corners[3 * i], &corners[3 * ((i + 1) % 3)]);
+    if (!(length > longest)) continue;
+    longest = length;
+    a = i;
+  }
+  const int b = (a + 1) % 3;
+  memcpy(low, corners, 9 * sizeof *low);
+  memcpy(high, corners, 9 * sizeof *high);
+  for (int k = 0; k < 3; k++) low[3 * b + k] = high[3 * a + k] = 0.5 * (corners[3 * a + k] + corners[3 * b + k]);
 }
 
 /* The spacing of points inside a triangle of this height: a share of the height, but at least `spacing` and at most

@@ -7,6 +7,8 @@
 
 /* Vectors and points are 3 doubles. Every function evaluates in a fixed order, so results are the same everywhere. */
 
+#define QMAT_PI 3.14159265358979323846
+
 /* The distance between two points, or between the centres of two spheres. */
 static inline double qmat_point_distance(const double *a, const double *b) {
   const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];

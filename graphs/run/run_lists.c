@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "graphs/run/run_lists.h"
 
+#include "core/key_table.h"
 #include "graphs/run/parallel_items.h"
 
 qmat_status qmat_count_lifted(qmat_context *context, const qmat_node *type, const qmat_value *const *inputs,
@@ -124,17 +125,47 @@ static bool are_equal(const lifted_step *lifted, const qmat_node *type, size_t a
   return true;
 }
 
-/* Lists the items that differ from every earlier one. `equals` gets for each item the first one that equals it. */
-static size_t find_different(const lifted_step *lifted, const qmat_node *type, size_t count, size_t *items,
-                             size_t *equals) {
-  size_t different = 0;
-  for (size_t i = 0; i < count; i++) {
-    size_t k = 0;
-    while (k < different && !are_equal(lifted, type, items[k], i)) k++;
-    if (k == different) items[different++] = i;
+/* A key that equal items have in common. */
+static uint64_t key_of(const lifted_step *lifted, const qmat_node *type, size_t item) {
+  uint64_t key = 0, first;
+  for (size_t port = 0; port < qmat_input_count(type); port++) {
+    const qmat_value *input = lifted->inputs[port];
+    if (!input || input->type != QMAT_LIST || type->inputs[port].list) continue;
+    memcpy(&first, qmat_value_at(input, item)->digest.bytes, sizeof first);
+    key = qmat_hash_mix(key) ^ first;
+  }
+  return key == QMAT_NO_KEY ? 0 : key;
+}
+
+/* Lists the items that differ from every earlier one: `*different` of them. `equals` gets for each item the first one
+ * that equals it. */
+static qmat_status find_different(qmat_context *context, const lifted_step *lifted, const qmat_node *type, size_t count,
+                                  size_t *items, size_t *equals, size_t *different) {
+  qmat_key_table newest;                              /* per key: the newest item in the list that has it */
+  uint32_t *older = qmat_alloc(count, sizeof *older); /* per item in the list: the one before it with its key */
+  *different = 0;
+  bool done = qmat_key_table_init(&newest, count) == 0 && older;
+  for (size_t i = 0; i < count && done; i++) {
+    const uint64_t key = key_of(lifted, type, i);
+    const uint32_t first = qmat_key_table_id(&newest, key);
+    uint32_t k = first;
+    while (k != QMAT_NO_ID && !are_equal(lifted, type, items[k], i)) k = older[k];
+    if (k == QMAT_NO_ID) {
+      qmat_key_slot *slot = first == QMAT_NO_ID ? qmat_key_table_add(&newest, key) : qmat_key_table_find(&newest, key);
+      if (!slot) {
+        done = false;
+        break;
+      }
+      k = (uint32_t)(*different)++;
+      slot->id = k;
+      items[k] = i;
+      older[k] = first;
+    }
     equals[i] = items[k];
   }
-  return different;
+  qmat_key_table_uninit(&newest);
+  qmat_free(older);
+  return done ? QMAT_OK : qmat_fail_memory(context, "values");
 }
 
 /* Gives the items that were not run what was made of their equals. */
@@ -169,11 +200,11 @@ static qmat_status check_any_made(const lifted_step *lifted, qmat_context *conte
 static qmat_status run_items(qmat_context *context, lifted_step *lifted, const qmat_list *first) {
   const qmat_node *type = lifted->run->graph->nodes[lifted->step->node].type;
   size_t *sizes = qmat_alloc(first->count, sizeof *sizes), *items = qmat_alloc(first->count, sizeof *items),
-         *equals = qmat_alloc(first->count, sizeof *equals), failed = SIZE_MAX;
+         *equals = qmat_alloc(first->count, sizeof *equals), failed = SIZE_MAX, different = 0;
   lifted->hits = qmat_calloc(first->count, sizeof *lifted->hits);
   qmat_status status = sizes && items && equals && lifted->hits ? QMAT_OK : qmat_fail_memory(context, "values");
+  if (status == QMAT_OK) status = find_different(context, lifted, type, first->count, items, equals, &different);
   if (status == QMAT_OK) {
-    const size_t different = find_different(lifted, type, first->count, items, equals);
     lifted->items = items;
     for (size_t i = 0; i < different; i++) sizes[i] = item_size(type, lifted->inputs, items[i]);
     pthread_mutex_init(&lifted->lock, NULL);

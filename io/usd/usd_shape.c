@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-static const double PI = 3.14159265358979323846;
+#include "core/geometry/vector.h"
 
 /* The shapes, with the sizes that their schemas give them. A size that a shape lacks is 0. */
 typedef enum kind { SPHERE, CUBE, CYLINDER, CYLINDER_1, CONE, CAPSULE, CAPSULE_1, PLANE, KIND_COUNT } kind;
@@ -67,7 +67,7 @@ static void revolve(maker *m, const double (*profile)[2], size_t count, size_t s
     const bool from_pole = row == 1, to_pole = row + 1 == count;
     const int64_t above = (int64_t)m->point_count;
     for (size_t i = 0; i < (to_pole ? 1 : segments); i++) {
-      const double angle = 2 * PI * (double)i / (double)segments, radius = profile[row][0];
+      const double angle = 2 * QMAT_PI * (double)i / (double)segments, radius = profile[row][0];
       add_point(m, radius * cos(angle), radius * sin(angle), profile[row][1]);
     }
     for (size_t i = 0; i < segments; i++) {
@@ -97,7 +97,7 @@ static size_t add_row(double (*profile)[2], size_t count, double radius, double 
 static size_t add_quarter(double (*profile)[2], size_t count, double radius, double z, size_t steps, bool falling) {
   for (size_t i = 0; i <= steps; i++) {
     const size_t step = falling ? i : steps - i; /* from the rim */
-    const double angle = 0.5 * PI * (double)step / (double)steps;
+    const double angle = 0.5 * QMAT_PI * (double)step / (double)steps;
     const double along = step == steps ? radius : radius * sin(angle);
     count = add_row(profile, count, step == steps ? 0 : radius * cos(angle), falling ? z + along : z - along);
   }
@@ -225,7 +225,8 @@ bool qmat_usd_shape_mesh(const qmat_usd_shape *shape, size_t segments, qmat_aren
   } else {
     const size_t count = make_profile(kind, sizes, segments, profile);
     revolve(&m, (const double(*)[2])profile, count, segments);
-    const double radius = kind == SPHERE ? sizes[0] : fmax(sizes[1], sizes[2]), sine = sin(0.5 * PI / (double)segments);
+    const double radius = kind == SPHERE ? sizes[0] : fmax(sizes[1], sizes[2]),
+                 sine = sin(0.5 * QMAT_PI / (double)segments);
     /* The sagitta of a chord, of circles about the axis and of round profiles. */
     const bool is_round = kind == SPHERE || kind == CAPSULE || kind == CAPSULE_1;
     mesh->deviation = (is_round ? 4 : 2) * radius * sine * sine;

@@ -6,8 +6,6 @@
 
 #include "core/geometry/vector.h"
 
-static const double PI = 3.14159265358979323846;
-
 typedef qmat_usd_transform transform;
 
 /* ---- matrices ---- */
@@ -74,7 +72,7 @@ bool qmat_usd_inverse(const transform *t, transform *result) {
 static transform rotation(int axis, double degrees) {
   transform result = qmat_usd_identity();
   const double turns = degrees / 90;
-  double c = cos(degrees * PI / 180), s = sin(degrees * PI / 180);
+  double c = cos(degrees * QMAT_PI / 180), s = sin(degrees * QMAT_PI / 180);
   if (turns == floor(turns) && fabs(turns) < 0x1p52) { /* right angles are exact */
     static const double cosines[] = {1, 0, -1, 0}, sines[] = {0, 1, 0, -1};
     const int quarter = (int)(turns - 4 * floor(turns / 4));

@@ -70,6 +70,13 @@ typedef struct merging {
   uint8_t *is_vertex; /* scratch: of a joint hull's points */
 } merging;
 
+/* Records why hulls were not made. */
+static qmat_status fail(const merging *m, qmat_status status) {
+  if (status == QMAT_OK) return QMAT_OK;
+  if (status == QMAT_ERROR_MEMORY) return qmat_fail_memory(m->context, "the hulls");
+  return qmat_fail(m->context, status, "rounding spoils the hull of a part of the solid");
+}
+
 /* The hull of two parts. */
 static qmat_status join(const merging *m, const part *a, const part *b, joint *j) {
   j->point_count = a->count + b->count;
@@ -79,15 +86,17 @@ static qmat_status join(const merging *m, const part *a, const part *b, joint *j
   return qmat_convex_hull(j->points, j->point_count, j->triangles, &j->triangle_count);
 }
 
-/* How far the facets between two parts leave the solid. */
-static void test_pair(const merging *m, pair *p, int halvings, joint *j) {
+/* How far the facets between two parts leave the solid. Parts without a joint hull stay apart. */
+static qmat_status test_pair(const merging *m, pair *p, int halvings, joint *j) {
   const part *a = &m->parts[p->a], *b = &m->parts[p->b];
   p->leaves = INFINITY;
   p->exceeds = true;
-  if (join(m, a, b, j) != QMAT_OK) return;
+  const qmat_status status = join(m, a, b, j);
+  if (status != QMAT_OK) return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
   p->leaves = qmat_joint_protrusion(m->solid, j->unit, a->count, j->triangles, j->triangle_count, m->limit, halvings);
   p->growth = qmat_hull_volume(j->points, j->triangles, j->triangle_count) - a->volume - b->volume;
   p->exceeds = p->leaves > m->limit;
+  return QMAT_OK;
 }
 
 static bool set_points(part *p, const double *points, size_t count) {
@@ -119,10 +128,13 @@ static qmat_status add_pair(merging *m, size_t a, size_t b) {
 static qmat_status test_pairs(merging *m, size_t first) {
   const int threads = qmat_threads(m->context);
   const size_t slice = 64;
+  bool done = true;
   for (; first < m->pair_count; first += slice) {
     const size_t end = first + slice < m->pair_count ? first + slice : m->pair_count;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
-    for (size_t i = first; i < end; i++) test_pair(m, &m->pairs[i], FEW_HALVINGS, &m->joints[omp_get_thread_num()]);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
+    for (size_t i = first; i < end; i++)
+      if (test_pair(m, &m->pairs[i], FEW_HALVINGS, &m->joints[omp_get_thread_num()]) != QMAT_OK) done = false;
+    if (!done) return fail(m, QMAT_ERROR_MEMORY);
     const qmat_status status = qmat_progress(m->context, m->part_count - m->live_count, m->part_count, "hulls joined");
     if (status != QMAT_OK) return status;
   }
@@ -174,7 +186,8 @@ static qmat_status renew_pairs(merging *m, uint32_t a, uint32_t gone) {
 static qmat_status join_pair(merging *m, uint32_t a, uint32_t b) {
   part *into = &m->parts[a], *from = &m->parts[b];
   joint *j = &m->joints[0];
-  if (join(m, into, from, j) != QMAT_OK) return qmat_fail_memory(m->context, "the hulls");
+  const qmat_status joined = join(m, into, from, j);
+  if (joined != QMAT_OK) return fail(m, joined);
   const double volume = qmat_hull_volume(j->points, j->triangles, j->triangle_count);
   size_t used = qmat_hull_vertices_keep(j->points, j->point_count, j->triangles, j->triangle_count, m->is_vertex);
   const double *vertices = j->points;
@@ -285,10 +298,10 @@ static qmat_status make_parts(merging *m, qmat_solid_part *given) {
     if (!memory) return qmat_fail_memory(m->context, "the hulls");
   }
   for (size_t i = 0; i < m->part_count; i++) m->live_count += m->parts[i].live;
-  for (size_t i = 0; i < m->part_count && m->live_count > 0; i++)
-    if (!m->parts[i].live && given[i].count > 0 && move_part(m, given, i) != QMAT_OK)
-      return qmat_fail_memory(m->context, "the hulls");
-  return QMAT_OK;
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < m->part_count && m->live_count > 0 && status == QMAT_OK; i++)
+    if (!m->parts[i].live && given[i].count > 0) status = move_part(m, given, i);
+  return fail(m, status);
 }
 
 static qmat_status init(merging *m, qmat_solid_part *given, size_t count, size_t most_points) {
@@ -384,6 +397,7 @@ static qmat_status make_hulls(merging *m) {
   const size_t count = m->live_count;
   size_t room = 4;
   bool done = true;
+  int worst = QMAT_OK; /* a memory shortage comes after spoilt hulls, for any number of threads */
   m->ends = qmat_arena_calloc(&m->context->arena, count + 1, sizeof *m->ends);
   if (!m->ends) return qmat_fail_memory(m->context, "the hulls");
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
@@ -395,10 +409,12 @@ static qmat_status make_hulls(merging *m) {
     const qmat_status status = qmat_outer_hull_init(m->context, room, m->most_points, &m->joints[i].outer);
     if (status != QMAT_OK) return status;
   }
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
-  for (size_t i = 0; i < count; i++)
-    if (reduce_points(m, &m->ends[i], &m->joints[omp_get_thread_num()]) != QMAT_OK) done = false;
-  return done ? QMAT_OK : qmat_fail_memory(m->context, "the hulls");
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(max : worst)
+  for (size_t i = 0; i < count; i++) {
+    const int status = (int)reduce_points(m, &m->ends[i], &m->joints[omp_get_thread_num()]);
+    worst = status > worst ? status : worst;
+  }
+  return fail(m, (qmat_status)worst);
 }
 
 /* Writes the hulls. */
@@ -434,7 +450,7 @@ static qmat_status write_hulls(merging *m, qmat_colliders *c) {
   qmat_free(points);
   qmat_free(triangles);
   qmat_free(shapes);
-  return status == QMAT_OK ? QMAT_OK : qmat_fail_memory(m->context, "the hulls");
+  return fail(m, status);
 }
 
 qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, qmat_solid_part *parts, size_t most,
@@ -445,8 +461,8 @@ qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, q
   for (size_t enough = 1; status == QMAT_OK; enough = most, m.limit *= limit_step) {
     status = find_pairs(&m);
     for (pair *p; status == QMAT_OK && m.live_count > enough && (p = best_pair(&m));) {
-      test_pair(&m, p, MANY_HALVINGS, &m.joints[0]);
-      if (!p->exceeds) status = join_pair(&m, p->a, p->b);
+      status = fail(&m, test_pair(&m, p, MANY_HALVINGS, &m.joints[0]));
+      if (status == QMAT_OK && !p->exceeds) status = join_pair(&m, p->a, p->b);
     }
     if (most == 0 || m.live_count <= most || !(m.limit < 1)) break;
   }

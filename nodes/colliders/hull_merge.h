@@ -17,9 +17,10 @@
  * `colliders` has the hulls of qmat_shape_hulls, outside, in units of the model. They are replaced, unless no part has
  * a volume. `parts`: those of qmat_solid_parts_find for its shapes, with the same demands on `solid`; their points may
  * change. `error` is a length of the model, above 0. How far facets leave the solid is measured to half of the limit
- * (hull_outside.h). A hull leaves it by more where its part is not convex. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All
- * threads; the result does not depend on their number. Cost: a convex hull for each pair whose boxes meet, and after
- * each step for each such neighbour of the joint hull; then that of the exchange. */
+ * (hull_outside.h). A hull leaves it by more where its part is not convex. QMAT_ERROR_GEOMETRY where rounding spoils
+ * the hull of a part, QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. Cost:
+ * a convex hull for each pair whose boxes meet, and after each step for each such neighbour of the joint hull; then
+ * that of the exchange. */
 qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, qmat_solid_part *parts, size_t most,
                              size_t most_points, double error, qmat_colliders *colliders);
 

@@ -34,19 +34,18 @@ double qmat_shape_distance(const qmat_prepared_shape *shape, const double point[
 }
 
 double qmat_shape_volume(const double *spheres, const uint32_t ids[3]) {
-  static const double pi = 3.14159265358979323846;
   const double *s[3];
   for (int k = 0; k < 3; k++) s[k] = &spheres[4 * (size_t)ids[k]];
   const int width = qmat_shape_width(ids);
-  if (width == 1) return 4 / 3.0 * pi * s[0][3] * s[0][3] * s[0][3];
+  if (width == 1) return 4 / 3.0 * QMAT_PI * s[0][3] * s[0][3] * s[0][3];
   if (width == 2) {
     const double length = qmat_point_distance(s[0], s[1]), a = s[0][3], b = s[1][3];
     const double larger = fmax(a, b);
-    if (length <= fabs(a - b)) return 4 / 3.0 * pi * larger * larger * larger;
+    if (length <= fabs(a - b)) return 4 / 3.0 * QMAT_PI * larger * larger * larger;
     /* A frustum between the circles where it touches the spheres, and a cap of each sphere. */
     const double slope = (b - a) / length, rise2 = 1 - slope * slope;
     const double cap_a = a * (1 - slope), cap_b = b * (1 + slope), height = length + slope * (a - b);
-    return pi / 3 *
+    return QMAT_PI / 3 *
            (height * rise2 * (a * a + a * b + b * b) + cap_a * cap_a * (3 * a - cap_a) +
             cap_b * cap_b * (3 * b - cap_b));
   }
@@ -57,7 +56,7 @@ double qmat_shape_volume(const double *spheres, const uint32_t ids[3]) {
   const double area = 0.5 * sqrt(qmat_dot(normal, normal)), r = (s[0][3] + s[1][3] + s[2][3]) / 3;
   const double border =
       qmat_point_distance(s[0], s[1]) + qmat_point_distance(s[1], s[2]) + qmat_point_distance(s[2], s[0]);
-  return 2 * area * r + 0.5 * pi * r * r * border + 4 / 3.0 * pi * r * r * r;
+  return 2 * area * r + 0.5 * QMAT_PI * r * r * border + 4 / 3.0 * QMAT_PI * r * r * r;
 }
 
 /* ---- a growing set ---- */

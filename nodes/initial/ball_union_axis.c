@@ -34,10 +34,11 @@ typedef struct {
   size_t *ball_starts; /* the balls at corner i are ball_ids[ball_starts[i] .. ball_starts[i + 1]) */
   uint32_t *ball_ids;
   qmat_dual_complex dual;
-  uint32_t *sphere_of_ball;                /* per ball: its medial sphere, or QMAT_NO_ID */
-  size_t sphere_count;                     /* those of the Voronoi part, then those of further balls */
-  size_t edge_capacity, triangle_capacity; /* of the dual's arrays, in ids */
-  uint32_t *ball_of_cell;                  /* per tetrahedron: the ball that all of its corners are on, or QMAT_NO_ID */
+  uint32_t *sphere_of_ball; /* per ball: its medial sphere, or QMAT_NO_ID */
+  size_t sphere_count;      /* those of the Voronoi part, then those of further balls */
+  uint32_t *polygon;        /* scratch: of a Voronoi face; freed at the end */
+  size_t polygon_capacity;
+  uint32_t *ball_of_cell; /* per tetrahedron: the ball that all of its corners are on, or QMAT_NO_ID */
 } union_axis;
 
 /* --- corners ----------------------------------------------------------------------------------------------------- */
@@ -154,7 +155,7 @@ static uint32_t sphere_of(union_axis *u, uint32_t ball) {
 
 static qmat_status add_edge(union_axis *u, uint32_t a, uint32_t b) {
   qmat_dual_complex *d = &u->dual;
-  if (qmat_grow((void **)&d->edges, &u->edge_capacity, 2 * d->edge_count + 2, sizeof *d->edges))
+  if (qmat_grow((void **)&d->edges, &d->edge_capacity, 2 * d->edge_count + 2, sizeof *d->edges))
     return qmat_fail_memory(u->context, "medial edges");
   d->edges[2 * d->edge_count] = a;
   d->edges[2 * d->edge_count++ + 1] = b;
@@ -179,20 +180,20 @@ static bool is_kept(const qmat_dual_complex *d, uint32_t cell) {
   return cell != QMAT_NO_TETRAHEDRON && d->kinds[cell];
 }
 
-enum { MOST_RUN = 4096 };
-
 /* The Voronoi face of the corners (a, b), from the side of the tetrahedron `cell` opposite its corner `x`, across which
  * the next one is not kept. Adds the triangles of the part in the dual shape. Each part is met from both of its ends;
  * one of them adds it. */
 static qmat_status add_clipped_face(union_axis *u, uint32_t cell, uint32_t a, uint32_t b, uint32_t x, uint32_t y) {
   qmat_dual_complex *d = &u->dual;
-  uint32_t polygon[MOST_RUN + 2], last = cell, leaving = y, next;
+  uint32_t last = cell, leaving = y, next;
   size_t count = 0;
   const uint32_t entry = exit_ball(u, cell, x);
-  if (entry != QMAT_NO_ID) polygon[count++] = sphere_of(u, entry);
   for (;;) {
-    if (count > MOST_RUN) return QMAT_OK;
-    polygon[count++] = d->sphere_of[last];
+    /* Room for this one, and for the two where the face enters and leaves. */
+    if (qmat_grow((void **)&u->polygon, &u->polygon_capacity, count + 3, sizeof *u->polygon))
+      return qmat_fail_memory(u->context, "medial slabs");
+    if (count == 0 && entry != QMAT_NO_ID) u->polygon[count++] = sphere_of(u, entry);
+    u->polygon[count++] = d->sphere_of[last];
     const uint32_t across = leaving;
     next = qmat_dual_step_around(d, last, a, b, &leaving);
     if (is_kept(d, next)) {
@@ -201,13 +202,13 @@ static qmat_status add_clipped_face(union_axis *u, uint32_t cell, uint32_t a, ui
     }
     if (last < cell || (last == cell && y < x)) return QMAT_OK; /* added from the other end */
     const uint32_t leave = exit_ball(u, last, across);
-    if (leave != QMAT_NO_ID) polygon[count++] = sphere_of(u, leave);
+    if (leave != QMAT_NO_ID) u->polygon[count++] = sphere_of(u, leave);
     break;
   }
-  if (qmat_grow((void **)&d->triangles, &u->triangle_capacity, 3 * (d->triangle_count + count), sizeof *d->triangles))
+  if (qmat_grow((void **)&d->triangles, &d->triangle_capacity, 3 * (d->triangle_count + count), sizeof *d->triangles))
     return qmat_fail_memory(u->context, "medial slabs");
   for (size_t i = 1; i + 1 < count; i++) {
-    const uint32_t t[3] = {polygon[0], polygon[i], polygon[i + 1]};
+    const uint32_t t[3] = {u->polygon[0], u->polygon[i], u->polygon[i + 1]};
     if (t[0] != t[1] && t[1] != t[2] && t[0] != t[2]) memcpy(&d->triangles[3 * d->triangle_count++], t, sizeof t);
   }
   return QMAT_OK;
@@ -267,8 +268,6 @@ static qmat_status join_parts(union_axis *u, qmat_medial *medial) {
     if (d->kinds[i] && u->ball_of_cell[i] != QMAT_NO_ID && u->sphere_of_ball[u->ball_of_cell[i]] == QMAT_NO_ID)
       u->sphere_of_ball[u->ball_of_cell[i]] = d->sphere_of[i];
   u->sphere_count = d->sphere_count;
-  u->edge_capacity = 2 * d->edge_count;
-  u->triangle_capacity = 3 * d->triangle_count;
   qmat_status status = add_clipped_parts(u);
   for (size_t i = 0; i < u->count; i++)
     if (parts->isolated[i]) sphere_of(u, (uint32_t)i);
@@ -276,7 +275,7 @@ static qmat_status join_parts(union_axis *u, qmat_medial *medial) {
     const uint32_t a = sphere_of(u, parts->edges[2 * i]);
     status = add_edge(u, a, sphere_of(u, parts->edges[2 * i + 1]));
   }
-  if (status == QMAT_OK && qmat_grow((void **)&d->triangles, &u->triangle_capacity,
+  if (status == QMAT_OK && qmat_grow((void **)&d->triangles, &d->triangle_capacity,
                                      3 * (d->triangle_count + parts->triangle_count), sizeof *d->triangles))
     status = qmat_fail_memory(u->context, "medial slabs");
   if (status != QMAT_OK) return status;
@@ -297,5 +296,6 @@ qmat_status qmat_ball_union_axis(qmat_context *context, const double *balls, siz
   qmat_ball_union_free(u.shape);
   qmat_free(u.dual.edges);
   qmat_free(u.dual.triangles);
+  qmat_free(u.polygon);
   return status;
 }

@@ -2,32 +2,19 @@
 #include "nodes/initial/creases.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/half_edges.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 
 const double qmat_corner_bend = 45;
 
-static const double RADIANS_PER_DEGREE = 3.14159265358979323846 / 180;
+static const double RADIANS_PER_DEGREE = QMAT_PI / 180;
 
 static double cosine_of(double degrees) {
   return cos(degrees * RADIANS_PER_DEGREE);
-}
-
-/* A side of a triangle: its ends, and 3 * triangle + k for the side from corner k to the next. */
-typedef struct {
-  uint32_t low, high;
-  size_t side;
-} triangle_side;
-
-static int by_ends(const void *left, const void *right) {
-  const triangle_side *a = left, *b = right;
-  if (a->low != b->low) return a->low < b->low ? -1 : 1;
-  if (a->high != b->high) return a->high < b->high ? -1 : 1;
-  return a->side < b->side ? -1 : a->side > b->side;
 }
 
 static void normal_of(const qmat_mesh *mesh, const double *positions, size_t triangle, double normal[3]) {
@@ -42,14 +29,15 @@ typedef struct {
   bool is_convex;
 } edge_bend;
 
-static edge_bend bend_of(const qmat_mesh *mesh, const double *positions, const triangle_side *sides) {
+/* `sides`: both half-edges. */
+static edge_bend bend_of(const qmat_mesh *mesh, const double *positions, uint32_t low, const uint32_t sides[2]) {
   double normals[2][3], axis[3], across[3];
-  for (int k = 0; k < 2; k++) normal_of(mesh, positions, sides[k].side / 3, normals[k]);
+  for (int k = 0; k < 2; k++) normal_of(mesh, positions, sides[k] / 3, normals[k]);
   if (qmat_dot(normals[0], normals[0]) == 0 || qmat_dot(normals[1], normals[1]) == 0) return (edge_bend){0};
   qmat_cross(normals[0], normals[1], axis);
-  const size_t second = sides[1].side / 3, opposite = (sides[1].side + 2) % 3;
+  const size_t second = sides[1] / 3, opposite = (sides[1] + 2) % 3;
   const double *apex = &positions[3 * (size_t)mesh->triangles[3 * second + opposite]];
-  for (int k = 0; k < 3; k++) across[k] = apex[k] - positions[3 * (size_t)sides[0].low + (size_t)k];
+  for (int k = 0; k < 3; k++) across[k] = apex[k] - positions[3 * (size_t)low + (size_t)k];
   return (edge_bend){atan2(sqrt(qmat_dot(axis, axis)), qmat_dot(normals[0], normals[1])),
                      qmat_dot(normals[0], across) < 0};
 }
@@ -77,33 +65,30 @@ static qmat_status drop_short(qmat_context *context, const double *positions, si
 qmat_status qmat_crease_edges_find(qmat_context *context, const qmat_mesh *mesh, const double *positions, double angle,
                                    double shortest, qmat_crease_edges *edges) {
   const size_t count = 3 * mesh->triangle_count;
-  triangle_side *sides = qmat_arena_alloc(&context->arena, count, sizeof *sides);
   edges->ends = qmat_arena_alloc(&context->arena, count / 2, 2 * sizeof *edges->ends);
   edges->count = 0;
   edges->sharp_share = 0;
-  if (!sides || !edges->ends) return qmat_fail_memory(context, "creases");
-  for (size_t i = 0; i < count; i++) {
-    const uint32_t a = mesh->triangles[i], b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];
-    sides[i] = (triangle_side){a < b ? a : b, a < b ? b : a, i};
-  }
+  if (!edges->ends) return qmat_fail_memory(context, "creases");
+  qmat_half_edges sides;
   qmat_status status = qmat_progress(context, 0, 0, "creases");
+  if (status == QMAT_OK)
+    status = qmat_half_edges_sort(context, mesh->vertex_count, mesh->triangle_count, mesh->triangles, &sides);
+  if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "creases");
   if (status != QMAT_OK) return status;
-  if (count) qsort(sides, count, sizeof *sides, by_ends);
-  if ((status = qmat_progress(context, 0, 0, "creases")) != QMAT_OK) return status;
   const double least_angle = angle * RADIANS_PER_DEGREE;
   double bending = 0, sharp = 0;
   for (size_t i = 0, end; i < count; i = end) {
-    for (end = i + 1; end < count && sides[end].low == sides[i].low && sides[end].high == sides[i].high;) end++;
+    end = qmat_edge_last(&sides, i);
     if (end - i != 2) continue;
-    const edge_bend bend = bend_of(mesh, positions, &sides[i]);
-    const double share =
-        bend.angle * qmat_point_distance(&positions[3 * (size_t)sides[i].low], &positions[3 * (size_t)sides[i].high]);
+    const uint32_t low = qmat_half_edge_low(&sides, sides.order[i]), high = qmat_half_edge_high(&sides, sides.order[i]);
+    const edge_bend bend = bend_of(mesh, positions, low, &sides.order[i]);
+    const double share = bend.angle * qmat_point_distance(&positions[3 * (size_t)low], &positions[3 * (size_t)high]);
     bending += share;
     if (!(bend.angle > least_angle)) continue;
     sharp += share;
     if (!bend.is_convex) continue;
-    edges->ends[2 * edges->count] = sides[i].low;
-    edges->ends[2 * edges->count++ + 1] = sides[i].high;
+    edges->ends[2 * edges->count] = low;
+    edges->ends[2 * edges->count++ + 1] = high;
   }
   edges->sharp_share = bending > 0 ? sharp / bending : 0;
   return drop_short(context, positions, mesh->vertex_count, shortest, edges);

@@ -38,10 +38,12 @@ typedef struct qmat_dual_complex {
   size_t sphere_count;
   uint32_t *edges, *triangles; /* of medial vertices */
   size_t edge_count, triangle_count;
+  size_t edge_capacity, triangle_capacity; /* of both, in ids */
   /* What edges and triangles are dual to, if `keep_duals` is set: 3 corners of a facet, 2 ends of a Delaunay edge. The
    * owner frees both. */
   bool keep_duals;
   uint32_t *edge_duals, *triangle_duals;
+  size_t edge_dual_capacity, triangle_dual_capacity; /* in ids */
 } qmat_dual_complex;
 
 /* The solid that a point bounds. */
@@ -67,7 +69,8 @@ static inline uint32_t qmat_dual_step_around(const qmat_dual_complex *dual, uint
 
 /* Sets `edges` and `triangles`: an edge across each facet between two kept tetrahedra with different medial vertices,
  * and the triangles of a polygon for each Delaunay edge whose whole ring is kept. Reads `cells`, `kinds` and
- * `sphere_of`; in voronoi_dual.c. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: linear. */
+ * `sphere_of`; in voronoi_dual.c. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: linear for rings whose numbers
+ * are in no particular order, or rise. */
 qmat_status qmat_dual_connect(qmat_dual_complex *dual);
 
 #endif

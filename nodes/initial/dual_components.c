@@ -131,7 +131,7 @@ static medial_link link_of(const double *spheres, uint32_t a, uint32_t b) {
   return (medial_link){0, length, a < b ? a : b, a < b ? b : a};
 }
 
-enum { LINK_TEST_POINTS = 7, SPHERES_A_REPORT = 64 };
+enum { LINK_TEST_POINTS = 7, SPHERES_A_REPORT = 64, LINKS_A_REPORT = 64 };
 
 /* `spheres` holds 4 doubles per medial vertex. */
 static medial_link measured_link(const qmat_dual_complex *d, const double *spheres, uint32_t a, uint32_t b) {
@@ -148,12 +148,13 @@ static medial_link measured_link(const qmat_dual_complex *d, const double *spher
 
 /* A sphere at a site: a sample, or a solid. */
 typedef struct {
-  uint32_t site, sphere;
+  uint32_t site, component, sphere;
 } contact;
 
 static int by_site(const void *left, const void *right) {
   const contact *p = left, *q = right;
   if (p->site != q->site) return p->site < q->site ? -1 : 1;
+  if (p->component != q->component) return p->component < q->component ? -1 : 1;
   return p->sphere < q->sphere ? -1 : p->sphere > q->sphere;
 }
 
@@ -180,8 +181,8 @@ static contact *find_contacts(qmat_dual_complex *d, const uint32_t *index, const
   for (size_t i = 0; i < 4 * d->cells.count; i++) {
     const uint32_t sample = d->cells.corners[i];
     if (!d->kinds[i / 4] || !(homes || shared[sample])) continue;
-    const uint32_t sphere = d->sphere_of[i / 4];
-    contacts[(*count)++] = (contact){homes ? homes[index[sphere]] : sample, sphere};
+    const uint32_t sphere = d->sphere_of[i / 4], component = index[sphere];
+    contacts[(*count)++] = (contact){homes ? homes[component] : sample, component, sphere};
   }
   qsort(contacts, *count, sizeof *contacts, by_site);
   size_t kept = 0;
@@ -216,8 +217,7 @@ static qmat_status add_link(qmat_dual_complex *d, const double *spheres, const u
                             uint32_t *joined, size_t *links) {
   const uint32_t a = index[link->a], b = index[link->b];
   if (qmat_set_leader(joined, a) == qmat_set_leader(joined, b) || !is_near_solid(d, spheres, link)) return QMAT_OK;
-  size_t capacity = 2 * d->edge_count;
-  if (qmat_grow((void **)&d->edges, &capacity, 2 * (d->edge_count + 1), sizeof *d->edges))
+  if (qmat_grow((void **)&d->edges, &d->edge_capacity, 2 * (d->edge_count + 1), sizeof *d->edges))
     return qmat_fail_memory(d->context, "medial edges");
   d->edges[2 * d->edge_count] = link->a;
   d->edges[2 * d->edge_count + 1] = link->b;
@@ -227,28 +227,65 @@ static qmat_status add_link(qmat_dual_complex *d, const double *spheres, const u
   return QMAT_OK;
 }
 
+/* The contacts of one component at one site are contacts[first .. end). */
+typedef struct {
+  size_t first, end;
+} contact_row;
+
+static contact_row row_from(const contact *contacts, size_t count, size_t first) {
+  contact_row row = {first, first};
+  while (row.end < count && contacts[row.end].site == contacts[first].site &&
+         contacts[row.end].component == contacts[first].component)
+    row.end++;
+  return row;
+}
+
+/* Links that may be made; freed by the caller. */
+typedef struct {
+  medial_link *links;
+  size_t count, capacity;
+  size_t measured; /* including those that are not kept */
+} link_list;
+
+/* Adds the best link between two components at a site. */
+static qmat_status add_best_link(qmat_dual_complex *d, const double *spheres, const contact *contacts, contact_row from,
+                                 contact_row to, link_list *list) {
+  medial_link best = {INFINITY, INFINITY, NONE, NONE};
+  for (size_t i = from.first; i < from.end; i++)
+    for (size_t j = to.first; j < to.end; j++) {
+      const qmat_status status =
+          list->measured++ % LINKS_A_REPORT == 0 ? qmat_progress(d->context, 0, 0, "components") : QMAT_OK;
+      if (status != QMAT_OK) return status;
+      const medial_link link = measured_link(d, spheres, contacts[i].sphere, contacts[j].sphere);
+      if (better_link(&link, &best) < 0) best = link;
+    }
+  if (qmat_grow((void **)&list->links, &list->capacity, list->count + 1, sizeof *list->links))
+    return qmat_fail_memory(d->context, "components");
+  list->links[list->count++] = best;
+  return QMAT_OK;
+}
+
 /* Links components of one solid by edges between spheres that are responsible for a common sample, so that they touch
  * the surface at the same place. The edges that stay inside come first. */
 static qmat_status link_at_samples(qmat_dual_complex *d, const uint32_t *index, const uint32_t *homes, uint32_t *joined,
                                    const double *spheres, size_t *links) {
-  size_t count = 0, candidate_count = 0, capacity = 0;
+  size_t count = 0;
   const contact *contacts = find_contacts(d, index, NULL, &count);
-  medial_link *candidates = NULL;
+  link_list list = {0};
   qmat_status status = contacts ? QMAT_OK : qmat_fail_memory(d->context, "components");
-  for (size_t i = 0; i < count && status == QMAT_OK; i++)
-    for (size_t j = i + 1; j < count && contacts[j].site == contacts[i].site; j++) {
-      const uint32_t a = contacts[i].sphere, b = contacts[j].sphere;
-      if (index[a] == index[b] || homes[index[a]] != homes[index[b]]) continue;
-      if (qmat_grow((void **)&candidates, &capacity, candidate_count + 1, sizeof *candidates)) {
-        status = qmat_fail_memory(d->context, "components");
-        break;
-      }
-      candidates[candidate_count++] = measured_link(d, spheres, a, b);
+  for (contact_row from = {0, 0}; from.end < count && status == QMAT_OK;) {
+    from = row_from(contacts, count, from.end);
+    const contact *first = &contacts[from.first];
+    for (contact_row to = from; to.end < count && contacts[to.end].site == first->site && status == QMAT_OK;) {
+      to = row_from(contacts, count, to.end);
+      if (homes[contacts[to.first].component] == homes[first->component])
+        status = add_best_link(d, spheres, contacts, from, to, &list);
     }
-  if (candidate_count) qsort(candidates, candidate_count, sizeof *candidates, better_link);
-  for (size_t i = 0; i < candidate_count && status == QMAT_OK; i++)
-    status = add_link(d, spheres, index, &candidates[i], joined, links);
-  qmat_free(candidates);
+  }
+  if (list.count) qsort(list.links, list.count, sizeof *list.links, better_link);
+  for (size_t i = 0; i < list.count && status == QMAT_OK; i++)
+    status = add_link(d, spheres, index, &list.links[i], joined, links);
+  qmat_free(list.links);
   return status;
 }
 

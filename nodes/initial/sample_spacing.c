@@ -2,9 +2,9 @@
 #include "nodes/initial/sample_spacing.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/half_edges.h"
 #include "core/geometry/triangle.h"
 #include "core/hash.h"
 
@@ -15,47 +15,30 @@ static const double displacement = 0.2;
 /* A side that is longer than a number of spacings by rounding alone has no further point. */
 static const double rounding = 1e-9;
 
-typedef struct side {
-  uint32_t low, high;
-  size_t corner; /* 3 * facet + k */
-} side;
-
-static int compare_sides(const void *left, const void *right) {
-  const side *a = left, *b = right;
-  if (a->low != b->low) return a->low < b->low ? -1 : 1;
-  if (a->high != b->high) return a->high < b->high ? -1 : 1;
-  return a->corner < b->corner ? -1 : a->corner > b->corner;
-}
-
 qmat_status qmat_side_points_count(qmat_context *context, const qmat_mesh *mesh, const double *positions,
                                    const double *spacings, uint32_t *counts) {
-  size_t long_sides = 0;
+  bool any = false;
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
     const size_t next = i % 3 == 2 ? i - 2 : i + 1;
     const double length =
         qmat_point_distance(&positions[3 * (size_t)mesh->triangles[i]], &positions[3 * (size_t)mesh->triangles[next]]);
     counts[i] = (uint32_t)fmax(ceil(length / spacings[i / 3] - rounding) - 1, 0);
-    long_sides += counts[i] > 0;
+    any |= counts[i] > 0;
   }
-  side *sides = qmat_arena_alloc(&context->arena, long_sides, sizeof *sides);
-  if (!sides) return qmat_fail_memory(context, "the long sides of facets");
-  long_sides = 0;
-  for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
-    if (counts[i] == 0) continue;
-    const uint32_t a = mesh->triangles[i], b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];
-    sides[long_sides++] = (side){a < b ? a : b, a < b ? b : a, i};
-  }
-  qsort(sides, long_sides, sizeof *sides, compare_sides);
-  for (size_t i = 1, first = 0; i < long_sides; i++) {
-    if (sides[i].low != sides[first].low || sides[i].high != sides[first].high) {
-      first = i;
-      continue;
+  if (!any) return QMAT_OK;
+  qmat_half_edges sides;
+  const qmat_status status =
+      qmat_half_edges_sort(context, mesh->vertex_count, mesh->triangle_count, mesh->triangles, &sides);
+  for (size_t first = 0, last; status == QMAT_OK && first < sides.count; first = last) {
+    last = qmat_edge_last(&sides, first);
+    while (first < last && counts[sides.order[first]] == 0) first++;
+    for (size_t i = first + 1; i < last; i++) {
+      uint32_t *own = &counts[sides.order[first]], *other = &counts[sides.order[i]];
+      *own = *other > *own ? *other : *own;
+      *other = 0;
     }
-    uint32_t *own = &counts[sides[first].corner], *other = &counts[sides[i].corner];
-    *own = *other > *own ? *other : *own;
-    *other = 0;
   }
-  return QMAT_OK;
+  return status;
 }
 
 void qmat_side_points_fill(int side, uint32_t count, double *barycentrics) {

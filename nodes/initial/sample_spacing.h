@@ -10,7 +10,7 @@
 /* Counts the points that each facet owns on its sides: counts[3 * t + k] between corner k and the next, so that
  * neighbouring points are at most as far apart as the spacing of each facet with that side. The first facet that asks
  * for points owns them. `positions` holds 3 doubles per vertex, `spacings` 1 and `counts` 3 numbers per facet.
- * QMAT_ERROR_MEMORY. Cost: O(n log n) in the number of long sides. */
+ * QMAT_ERROR_MEMORY. Cost: linear. */
 qmat_status qmat_side_points_count(qmat_context *context, const qmat_mesh *mesh, const double *positions,
                                    const double *spacings, uint32_t *counts);
 

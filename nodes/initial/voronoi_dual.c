@@ -24,26 +24,47 @@
 /* The corner pairs of a tetrahedron's edges. */
 static const uint8_t edge_corners[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-/* Walks around the Delaunay edge (a, b) from the tetrahedron `start`. Returns the length of the ring, or 0 unless it is
- * closed, all its tetrahedra are kept and `start` is the smallest, so that each ring is found once. */
-static size_t walk_ring(const qmat_dual_complex *d, uint32_t start, uint32_t a, uint32_t b, uint32_t *ring,
-                        size_t capacity) {
+/* The tetrahedra around an edge, then their medial vertices. */
+typedef struct {
+  uint32_t *ids;
+  size_t count, capacity;
+} id_ring;
+
+/* Walks around the Delaunay edge (a, b) from the tetrahedron `start`. The ring is empty unless it is closed, all its
+ * tetrahedra are kept and `start` is the smallest, so that each ring is found once. Nonzero when memory is short. */
+static int walk_ring(const qmat_dual_complex *d, uint32_t start, uint32_t a, uint32_t b, id_ring *ring) {
   const uint32_t *corners = &d->cells.corners[4 * (size_t)start];
-  int across = 0;
+  size_t across = 0, behind = 3;
   while (corners[across] == a || corners[across] == b) across++;
+  while (corners[behind] == a || corners[behind] == b) behind--;
+  ring->count = 0;
+  /* The last one of the ring tells soonest that another is the smallest. */
+  const uint32_t last = d->cells.neighbours[4 * (size_t)start + behind];
+  if (last == QMAT_NO_TETRAHEDRON || last < start) return 0;
   uint32_t cell = start;
   uint32_t leaving = corners[across]; /* the next tetrahedron is across the facet opposite this corner */
   size_t count = 0;
   do {
-    if (cell < start || count == capacity) return 0;
-    ring[count++] = cell;
+    if (cell < start) return 0;
+    if (qmat_grow((void **)&ring->ids, &ring->capacity, count + 1, sizeof *ring->ids)) return -1;
+    ring->ids[count++] = cell;
     cell = qmat_dual_step_around(d, cell, a, b, &leaving);
     if (cell == QMAT_NO_TETRAHEDRON || !d->kinds[cell]) return 0;
   } while (cell != start);
-  return count;
+  ring->count = count;
+  return 0;
 }
 
-enum { RING_CAPACITY = 4096 };
+/* Makes of a ring its dual polygon: the medial vertices, each once. */
+static void find_polygon(const qmat_dual_complex *d, id_ring *ring) {
+  size_t count = 0;
+  for (size_t k = 0; k < ring->count; k++) {
+    const uint32_t sphere = d->sphere_of[ring->ids[k]];
+    if (count == 0 || ring->ids[count - 1] != sphere) ring->ids[count++] = sphere;
+  }
+  while (count > 1 && ring->ids[count - 1] == ring->ids[0]) count--;
+  ring->count = count;
+}
 
 /* Triangulates the dual polygon of a ring as a fan from its smallest medial vertex. */
 static size_t fan(const uint32_t *polygon, size_t count, uint32_t *triangles) {
@@ -58,18 +79,14 @@ static size_t fan(const uint32_t *polygon, size_t count, uint32_t *triangles) {
   return made;
 }
 
-typedef struct {
-  size_t edges, triangles, edge_duals, triangle_duals;
-} dual_capacity;
-
 /* Room for `edges` and `triangles` more. */
-static int reserve(qmat_dual_complex *d, dual_capacity *room, size_t edges, size_t triangles) {
+static int reserve(qmat_dual_complex *d, size_t edges, size_t triangles) {
   const size_t e = d->edge_count + edges, t = d->triangle_count + triangles;
-  int bad = qmat_grow((void **)&d->edges, &room->edges, 2 * e, sizeof *d->edges) ||
-            qmat_grow((void **)&d->triangles, &room->triangles, 3 * t, sizeof *d->triangles);
+  int bad = qmat_grow((void **)&d->edges, &d->edge_capacity, 2 * e, sizeof *d->edges) ||
+            qmat_grow((void **)&d->triangles, &d->triangle_capacity, 3 * t, sizeof *d->triangles);
   if (!bad && d->keep_duals)
-    bad = qmat_grow((void **)&d->edge_duals, &room->edge_duals, 3 * e, sizeof *d->edge_duals) ||
-          qmat_grow((void **)&d->triangle_duals, &room->triangle_duals, 2 * t, sizeof *d->triangle_duals);
+    bad = qmat_grow((void **)&d->edge_duals, &d->edge_dual_capacity, 3 * e, sizeof *d->edge_duals) ||
+          qmat_grow((void **)&d->triangle_duals, &d->triangle_dual_capacity, 2 * t, sizeof *d->triangle_duals);
   return bad;
 }
 
@@ -86,38 +103,41 @@ static void add_edges(qmat_dual_complex *d, size_t i) {
   }
 }
 
-qmat_status qmat_dual_connect(qmat_dual_complex *d) {
-  qmat_context *context = d->context;
-  const size_t count = d->cells.count;
-  dual_capacity room = {0};
-  qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < count; i++) {
-    if (i % 65536 == 0 && (status = qmat_progress(context, i, count, "dual cells")) != QMAT_OK) return status;
-    if (!d->kinds[i]) continue;
-    if (reserve(d, &room, 4, 0)) return qmat_fail_memory(context, "medial edges");
-    add_edges(d, i);
-    for (int e = 0; e < 6; e++) {
-      uint32_t ring[RING_CAPACITY];
-      const uint32_t *corners = &d->cells.corners[4 * i];
-      const uint32_t a = corners[edge_corners[e][0]], b = corners[edge_corners[e][1]];
-      const size_t n = walk_ring(d, (uint32_t)i, a, b, ring, RING_CAPACITY);
-      size_t polygon = 0;
-      for (size_t k = 0; k < n; k++) {
-        const uint32_t sphere = d->sphere_of[ring[k]];
-        if (polygon == 0 || ring[polygon - 1] != sphere) ring[polygon++] = sphere;
-      }
-      while (polygon > 1 && ring[polygon - 1] == ring[0]) polygon--;
-      if (polygon < 3) continue;
-      if (reserve(d, &room, 0, polygon)) return qmat_fail_memory(context, "medial slabs");
-      const size_t made = fan(ring, polygon, &d->triangles[3 * d->triangle_count]);
-      for (size_t k = d->triangle_count; d->keep_duals && k < d->triangle_count + made; k++) {
-        d->triangle_duals[2 * k] = a;
-        d->triangle_duals[2 * k + 1] = b;
-      }
-      d->triangle_count += made;
+/* Adds the triangles of the polygons whose smallest tetrahedron is the i-th. */
+static qmat_status add_triangles(qmat_dual_complex *d, size_t i, id_ring *ring) {
+  const uint32_t *corners = &d->cells.corners[4 * i];
+  for (int e = 0; e < 6; e++) {
+    const uint32_t a = corners[edge_corners[e][0]], b = corners[edge_corners[e][1]];
+    if (walk_ring(d, (uint32_t)i, a, b, ring)) return qmat_fail_memory(d->context, "medial slabs");
+    find_polygon(d, ring);
+    if (ring->count < 3) continue;
+    if (reserve(d, 0, ring->count)) return qmat_fail_memory(d->context, "medial slabs");
+    const size_t made = fan(ring->ids, ring->count, &d->triangles[3 * d->triangle_count]);
+    for (size_t k = d->triangle_count; d->keep_duals && k < d->triangle_count + made; k++) {
+      d->triangle_duals[2 * k] = a;
+      d->triangle_duals[2 * k + 1] = b;
     }
+    d->triangle_count += made;
   }
   return QMAT_OK;
+}
+
+qmat_status qmat_dual_connect(qmat_dual_complex *d) {
+  const size_t count = d->cells.count;
+  id_ring ring = {0};
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+    if (i % 65536 == 0) status = qmat_progress(d->context, i, count, "dual cells");
+    if (status != QMAT_OK || !d->kinds[i]) continue;
+    if (reserve(d, 4, 0)) {
+      status = qmat_fail_memory(d->context, "medial edges");
+    } else {
+      add_edges(d, i);
+      status = add_triangles(d, i, &ring);
+    }
+  }
+  qmat_free(ring.ids);
+  return status;
 }
 
 /* --- responsible regions ----------------------------------------------------------------------------------------- */

@@ -9,8 +9,6 @@
 #include "core/value_check.h"
 #include "nodes/measure/area_samples.h"
 
-static const double pi = 3.14159265358979323846;
-
 /* Turns counts at [row + 2] into the places where rows are filled. Filling them makes the places offsets. */
 static void sum_counts(size_t *offsets, size_t rows) {
   for (size_t i = 0; i < rows; i++) offsets[i + 2] += offsets[i + 1];
@@ -112,9 +110,9 @@ double qmat_boundary_feature_area(const qmat_boundary_features *f, size_t featur
   double corners[9], normal[3];
   switch (qmat_boundary_feature_kind(f, feature, &row)) {
     case QMAT_FEATURE_SPHERE:
-      return 4 * pi * f->spheres[4 * row + 3] * f->spheres[4 * row + 3];
+      return 4 * QMAT_PI * f->spheres[4 * row + 3] * f->spheres[4 * row + 3];
     case QMAT_FEATURE_CONE_SIDE:
-      return qmat_cone_side_of_edge(f, row, &side) ? pi * (side.a[3] + side.b[3]) * side.across * side.length : 0;
+      return qmat_cone_side_of_edge(f, row, &side) ? QMAT_PI * (side.a[3] + side.b[3]) * side.across * side.length : 0;
     default:
       return qmat_slab_face(f, row, corners) ? qmat_triangle_area(corners, corners + 3, corners + 6, normal) : 0;
   }
@@ -125,7 +123,7 @@ static void cone_side_point(const qmat_cone_side *side, double x, double y, doub
   /* The square of the radius is even along the side: r(t)^2 = (1 - x) ra^2 + x rb^2. */
   const double ra = side->a[3], rb = side->b[3], sum = ra + sqrt((1 - x) * ra * ra + x * rb * rb);
   qmat_cone_side_sphere(side, sum > 0 ? x * (ra + rb) / sum : x, sphere);
-  qmat_cone_side_normal(side, 2 * pi * y, normal);
+  qmat_cone_side_normal(side, 2 * QMAT_PI * y, normal);
   for (int k = 0; k < 3; k++) point[k] = sphere[k] + sphere[3] * normal[k];
 }
 
@@ -136,7 +134,7 @@ void qmat_boundary_feature_point(const qmat_boundary_features *f, size_t feature
   double corners[9];
   if (kind == QMAT_FEATURE_SPHERE) {
     const double *s = &f->spheres[4 * row], z = 2 * x - 1, ring = sqrt(1 - z * z);
-    const double normal[3] = {ring * cos(2 * pi * y), ring * sin(2 * pi * y), z};
+    const double normal[3] = {ring * cos(2 * QMAT_PI * y), ring * sin(2 * QMAT_PI * y), z};
     for (int k = 0; k < 3; k++) point[k] = s[k] + s[3] * normal[k];
   } else if (kind == QMAT_FEATURE_CONE_SIDE) {
     if (qmat_cone_side_of_edge(f, row, &side)) cone_side_point(&side, x, y, point);

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 
 static const double half_pi = 1.57079632679489661923;
@@ -219,22 +220,6 @@ int qmat_boundary_piece_child_count(const qmat_boundary_features *f, const qmat_
   return along > 2 * around || around > 2 * along ? 2 : 4;
 }
 
-/* At the middle of the longest side. */
-static void split_slab_face(const qmat_boundary_piece *p, qmat_boundary_piece children[2]) {
-  int a = 0;
-  double longest = -1;
-  for (int i = 0; i < 3; i++) {
-    const double length = qmat_point_distance(&p->at[3 * i], &p->at[3 * ((i + 1) % 3)]);
-    if (length > longest) {
-      longest = length;
-      a = i;
-    }
-  }
-  const int b = (a + 1) % 3;
-  for (int k = 0; k < 3; k++)
-    children[0].at[3 * b + k] = children[1].at[3 * a + k] = 0.5 * (p->at[3 * a + k] + p->at[3 * b + k]);
-}
-
 static void split_sphere(const qmat_boundary_piece *p, qmat_boundary_piece children[4]) {
   double middles[3][3]; /* opposite to each corner */
   for (int i = 0; i < 3; i++) {
@@ -284,6 +269,6 @@ void qmat_boundary_piece_split(const qmat_boundary_features *f, const qmat_bound
       split_cone_side(f, p, count, children);
       break;
     default:
-      split_slab_face(p, children);
+      qmat_triangle_halve(p->at, children[0].at, children[1].at);
   }
 }

@@ -4,10 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/geometry/vector.h"
-
-/* Below this, rounding of F exceeds the tolerance. */
-static const double least_tolerance = 1e-6;
+#include "core/geometry/triangle.h"
 
 /* The bound is raised by it: more than the rounding of F. */
 static const double rounding = 1e-9;
@@ -45,20 +42,8 @@ static void search_piece(facet_search *search, double corners[3][3]) {
     search->bound = fmax(search->bound, bound);
     return;
   }
-  int a = 0, b = 1;
-  double longest = -1;
-  for (int i = 0; i < 3; i++) {
-    const double length = qmat_point_distance(corners[i], corners[(i + 1) % 3]);
-    if (length > longest) {
-      longest = length;
-      a = i;
-      b = (i + 1) % 3;
-    }
-  }
   double low[3][3], high[3][3];
-  memcpy(low, corners, sizeof low);
-  memcpy(high, corners, sizeof high);
-  for (int k = 0; k < 3; k++) low[b][k] = high[a][k] = 0.5 * (corners[a][k] + corners[b][k]);
+  qmat_triangle_halve(corners[0], low[0], high[0]);
   search_piece(search, low);
   search_piece(search, high);
 }
@@ -78,7 +63,7 @@ static qmat_status search_facets(qmat_context *context, const qmat_surface *surf
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : bound)
     for (size_t t = first; t < last; t++) {
       facet_search search = {.envelope = envelope,
-                             .tolerance = fmax(tolerance, least_tolerance),
+                             .tolerance = fmax(tolerance, QMAT_LEAST_ENVELOPE_TOLERANCE),
                              .decisive = decisive - rounding,
                              .found = known,
                              .bound = -INFINITY,

@@ -7,6 +7,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/geometry/envelope.h"
+#include "core/geometry/half_edges.h"
 #include "core/geometry/medial_complex.h"
 #include "core/geometry/sheets.h"
 #include "core/geometry/vector.h"
@@ -22,11 +23,6 @@ typedef struct {
   uint64_t class; /* a loop bounds part of the surface if the classes of its edges cancel (Z/2) */
   double length;
 } surface_edge;
-
-typedef struct {
-  uint64_t key; /* lower end, higher end */
-  uint32_t triangle;
-} side;
 
 typedef struct {
   qmat_lost_handle handle;
@@ -49,30 +45,24 @@ typedef struct {
   size_t reached_count;
 } search;
 
-static int compare_sides(const void *left, const void *right) {
-  const side *a = left, *b = right;
-  if (a->key != b->key) return a->key > b->key ? 1 : -1;
-  return (a->triangle > b->triangle) - (a->triangle < b->triangle);
-}
-
 /* `*paired`: whether every edge has two triangles. */
 static qmat_status find_edges(qmat_context *context, search *s, bool *paired) {
   const size_t corners = 3 * s->mesh->triangle_count;
-  side *sides = qmat_arena_alloc(&context->arena, corners, sizeof *sides);
   s->edge_count = corners / 2;
   s->edges = qmat_arena_calloc(&context->arena, s->edge_count, sizeof *s->edges);
-  if (!sides || !s->edges) return qmat_fail_memory(context, "handles");
-  for (size_t c = 0; c < corners; c++) {
-    const uint32_t a = s->mesh->triangles[c], b = s->mesh->triangles[c % 3 == 2 ? c - 2 : c + 1];
-    sides[c] = (side){(uint64_t)(a < b ? a : b) << 32 | (a < b ? b : a), (uint32_t)(c / 3)};
-  }
-  if (corners) qsort(sides, corners, sizeof *sides, compare_sides);
-  *paired = corners % 2 == 0;
-  for (size_t c = 0; c + 1 < corners && *paired; c += 2) {
-    *paired = sides[c].key == sides[c + 1].key && (c + 2 >= corners || sides[c + 2].key != sides[c].key);
+  if (!s->edges) return qmat_fail_memory(context, "handles");
+  qmat_half_edges sides;
+  const qmat_status status =
+      qmat_half_edges_sort(context, s->mesh->vertex_count, s->mesh->triangle_count, s->mesh->triangles, &sides);
+  if (status != QMAT_OK) return status;
+  *paired = true;
+  for (size_t c = 0; c < corners; c += 2) {
+    *paired = qmat_edge_last(&sides, c) == c + 2;
+    if (!*paired) return QMAT_OK;
+    const uint32_t first = sides.order[c], second = sides.order[c + 1];
     surface_edge *edge = &s->edges[c / 2];
-    *edge = (surface_edge){.ends = {(uint32_t)(sides[c].key >> 32), (uint32_t)sides[c].key},
-                           .triangles = {sides[c].triangle, sides[c + 1].triangle}};
+    *edge = (surface_edge){.ends = {qmat_half_edge_low(&sides, first), qmat_half_edge_high(&sides, first)},
+                           .triangles = {first / 3, second / 3}};
     edge->length =
         qmat_point_distance(&s->positions[3 * (size_t)edge->ends[0]], &s->positions[3 * (size_t)edge->ends[1]]);
   }
@@ -235,7 +225,7 @@ static bool find_loop(const search *s, double longest, candidate *best) {
       found = true;
     }
   }
-  best->handle.size /= acos(-1);
+  best->handle.size /= QMAT_PI;
   return found;
 }
 

@@ -5,10 +5,8 @@
 #include <omp.h>
 #include <string.h>
 
-#include "core/geometry/vector.h"
+#include "core/geometry/triangle.h"
 
-/* Below this, rounding of F exceeds the tolerance. */
-static const double LEAST_TOLERANCE = 1e-6;
 /* Facets between two questions whether to cancel. */
 enum { SLICE = 1 << 12 };
 
@@ -51,16 +49,8 @@ static void measure_piece(measurement *m, double corners[3][3]) {
     m->errors[sphere] = fmax(m->errors[sphere], bound);
     return;
   }
-  int longest = 0;
-  for (int i = 1; i < 3; i++)
-    if (qmat_point_distance(corners[i], corners[(i + 1) % 3]) >
-        qmat_point_distance(corners[longest], corners[(longest + 1) % 3]))
-      longest = i;
-  const int next = (longest + 1) % 3;
   double low[3][3], high[3][3];
-  memcpy(low, corners, sizeof low);
-  memcpy(high, corners, sizeof high);
-  for (int k = 0; k < 3; k++) low[next][k] = high[longest][k] = 0.5 * (corners[longest][k] + corners[next][k]);
+  qmat_triangle_halve(corners[0], low[0], high[0]);
   measure_piece(m, low);
   measure_piece(m, high);
 }
@@ -121,7 +111,7 @@ qmat_status qmat_sphere_errors_measure(qmat_context *context, const qmat_surface
   measurement m = {.envelope = envelope,
                    .spheres = spheres,
                    .most = most,
-                   .tolerance = fmax(tolerance, LEAST_TOLERANCE),
+                   .tolerance = fmax(tolerance, QMAT_LEAST_ENVELOPE_TOLERANCE),
                    .found = found};
   qmat_status status = measure_facets(context, surface, &m, measure_points, sphere_count, found);
   if (status == QMAT_OK) status = measure_facets(context, surface, &m, measure_piece, sphere_count, bounds);

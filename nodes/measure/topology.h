@@ -13,7 +13,10 @@ typedef struct qmat_topology {
   int64_t euler;
 } qmat_topology;
 
-/* Computes the topology of a sealed medial mesh as a simplicial complex. `components` and `euler` are always valid. For
+/* The medial meshes below need not be sealed. Their edges and triangles are those of qmat_medial_set_simplices: ids
+ * rise in each row, the rows rise, and every side of a triangle is one of the edges. */
+
+/* Computes the topology of a medial mesh as a simplicial complex. `components` and `euler` are always valid. For
  * `voids`, triangles at free edges are removed, triangles joined by edges of two are taken as one sheet, and the rank
  * of the remaining sparse matrix is found. `known` is false when that takes too long, which no medial mesh of a solid
  * has done so far. Linear but for the rank. QMAT_ERROR_MEMORY. */

@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/half_edges.h"
 #include "core/geometry/vector.h"
-#include "nodes/mesh/half_edges.h"
 
 /* A border vertex and its place along a direction that no plane of a model is likely to be perpendicular to. */
 typedef struct border_vertex {

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/half_edges.h"
 #include "nodes/mesh/crossings_cgal.h"
-#include "nodes/mesh/half_edges.h"
 
 typedef struct box {
   double low[3], high[3];

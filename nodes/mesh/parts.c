@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/half_edges.h"
 #include "core/geometry/triangle.h"
-#include "nodes/mesh/half_edges.h"
 
 /* What is seen of the holes from a point of the surface, as a share of all directions. At most this much is near 0. */
 static const double most_seen = 0.2;

@@ -5,8 +5,6 @@
 
 #include "core/geometry/vector.h"
 
-static const double pi = 3.14159265358979323846;
-
 /* The tangent of half the vertical field of view, and the share of the view that a model fills. */
 static const double half_view = 0.26794919243112270647;
 static const double filled = 0.92;
@@ -26,7 +24,7 @@ static const double error_colours[STOPS][3] = {{0x21 / 255.0, 0x66 / 255.0, 0xac
                                                {0xb2 / 255.0, 0x18 / 255.0, 0x2b / 255.0}};
 
 qmat_camera qmat_camera_of(double turn, double tilt, bool is_z_up) {
-  const double a = turn * pi / 180, b = tilt * pi / 180;
+  const double a = turn * QMAT_PI / 180, b = tilt * QMAT_PI / 180;
   if (is_z_up)
     return (qmat_camera){.right = {cos(a), sin(a), 0},
                          .up = {-sin(a) * sin(b), cos(a) * sin(b), cos(b)},

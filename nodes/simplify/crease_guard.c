@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/geometry/vector.h"
+#include "core/geometry/triangle.h"
 
 static const double *point_at(const qmat_crease_guard *g, size_t place) {
   return &g->points[3 * (size_t)g->creases.points[place]];
@@ -103,11 +103,9 @@ qmat_status qmat_crease_guard_renumber(qmat_context *context, const qmat_crease_
 }
 
 static double distance_to_segment(const double *p, const double *a, const double *b) {
-  double ab[3], ap[3], foot[3];
-  qmat_subtract(b, a, ab);
-  qmat_subtract(p, a, ap);
-  const double square = qmat_dot(ab, ab), t = square > 0 ? fmin(fmax(qmat_dot(ap, ab) / square, 0), 1) : 0;
-  for (int k = 0; k < 3; k++) foot[k] = a[k] + t * ab[k];
+  double foot[3];
+  const double t = qmat_closest_on_segment(p, a, b);
+  for (int k = 0; k < 3; k++) foot[k] = a[k] + t * (b[k] - a[k]);
   return qmat_point_distance(p, foot);
 }
 

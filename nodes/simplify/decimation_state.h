@@ -93,12 +93,12 @@ typedef struct qmat_decimation {
   double *fitted_errors;   /* per edge: the error of its newest fitted sphere */
   uint8_t *converged;      /* per vertex: whether its last fit did not move it, and no neighbour has moved since */
   const uint8_t *locked;   /* per vertex: whether its edges stay, in a piece of a larger medial mesh; NULL: none do */
-  bool fitting;
-  int refusal;                       /* why the newest test of a sphere failed */
-  uint32_t tested_first;             /* the constraint point that it tested first, or QMAT_NONE */
-  struct qmat_copy *copy;            /* NULL: the decimation is alone */
+  bool fitting;            /* whether spheres are fitted where no candidate is allowed; not in the first pass */
+  int refusal;             /* why the newest test of a sphere failed */
+  uint32_t tested_first;   /* the constraint point that it tested first, or QMAT_NONE */
+  struct qmat_copy *copy;  /* NULL: the decimation is alone */
   qmat_failed_places *failed_places; /* of earlier repairs of the same round; the caller's */
-  size_t moves;
+  size_t moves;                      /* of spheres by refits and repairs, with those of the rounds before */
   qmat_collapse_counts counts;
 } qmat_decimation;
 

@@ -158,11 +158,14 @@ static qmat_status measure_and_repair(qmat_simplification *s, qmat_medial **medi
   const int repairs = s->params.epsilon > 0 && s->params.refits > 0 ? QMAT_MOST_REPAIRS : 0;
   qmat_status status = qmat_simplification_measure(s, *medial, repairs > 0, found);
   qmat_failed_places failed = {0};
-  bool has_moved = true;
-  for (int i = 1; i <= repairs && status == QMAT_OK && is_beyond(s, found) && has_moved; i++) {
+  for (int i = 1; i <= repairs && status == QMAT_OK && is_beyond(s, found); i++) {
+    bool has_moved;
     status = repair_round(s, found, &failed, medial, &has_moved);
+    if (status == QMAT_OK && !has_moved && found->surface_to_envelope <= s->params.epsilon)
+      status = qmat_simplification_measure_envelope(s, *medial, found);
+    if (status != QMAT_OK || !has_moved) break; /* the other errors are those that were found */
     qmat_medial_errors_uninit(found);
-    if (status == QMAT_OK) status = qmat_simplification_measure(s, *medial, true, found);
+    status = qmat_simplification_measure(s, *medial, true, found);
   }
   qmat_failed_places_uninit(&failed);
   if (status == QMAT_OK && repairs > 0 && found->surface_to_envelope > s->params.epsilon) {

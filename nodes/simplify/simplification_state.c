@@ -6,6 +6,18 @@
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/measure/envelope_to_surface.h"
 
+qmat_status qmat_simplification_measure_envelope(const qmat_simplification *s, const qmat_medial *unit,
+                                                 qmat_medial_errors *errors) {
+  const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : QMAT_DEFAULT_EPSILON;
+  const qmat_decimation *round = &s->rounds[s->newest];
+  if (s->params.epsilon > 0 && s->params.error == QMAT_ERROR_TWO_SIDED) {
+    errors->envelope_to_surface = qmat_envelope_to_surface_largest_bound(&round->envelope_tracker, &round->complex);
+    if (!(errors->envelope_to_surface > epsilon)) return QMAT_OK;
+  }
+  return qmat_medial_envelope_bound_measure(s->context, s->surface, unit, qmat_error_tolerance * epsilon,
+                                            qmat_least_reported * epsilon, errors);
+}
+
 qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat_medial *unit, bool only_within,
                                         qmat_medial_errors *errors) {
   const double epsilon = s->params.epsilon > 0 ? s->params.epsilon : QMAT_DEFAULT_EPSILON;
@@ -16,11 +28,7 @@ qmat_status qmat_simplification_measure(const qmat_simplification *s, const qmat
                                         tolerance, enough, epsilon, errors);
   if (status != QMAT_OK || (only_within && errors->surface_to_envelope > epsilon)) return status;
   const bool two_sided = s->params.epsilon > 0 && s->params.error == QMAT_ERROR_TWO_SIDED;
-  const qmat_decimation *round = &s->rounds[s->newest];
-  if (two_sided)
-    errors->envelope_to_surface = qmat_envelope_to_surface_largest_bound(&round->envelope_tracker, &round->complex);
-  if (!two_sided || errors->envelope_to_surface > epsilon)
-    status = qmat_medial_envelope_bound_measure(s->context, s->surface, unit, tolerance, enough, errors);
+  status = qmat_simplification_measure_envelope(s, unit, errors);
   return status == QMAT_OK && two_sided
              ? qmat_medial_boundary_measure(s->context, s->surface, unit, epsilon, only_within, errors)
              : status;

@@ -53,6 +53,10 @@ typedef struct qmat_simplified {
 qmat_status qmat_simplification_measure(const qmat_simplification *simplification, const qmat_medial *unit,
                                         bool only_within, qmat_medial_errors *errors);
 
+/* The part of that which sets `errors->envelope_to_surface`. */
+qmat_status qmat_simplification_measure_envelope(const qmat_simplification *simplification, const qmat_medial *unit,
+                                                 qmat_medial_errors *errors);
+
 /* Whether `a` is better: first by its fault, then by its topology, then by its number of spheres. */
 bool qmat_simplified_is_better(const qmat_simplified *a, const qmat_simplified *b);
 

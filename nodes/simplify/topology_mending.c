@@ -79,6 +79,7 @@ static qmat_status try_edit(const qmat_simplification *s, const qmat_topology *b
   *done = false;
   qmat_status status = qmat_progress(s->context, 0, 0, "edits");
   if (status != QMAT_OK) return status;
+  const qmat_arena aside = qmat_arena_set_aside(&s->context->arena); /* each try frees its scratch memory */
   status = apply(s->context, result->medial, e, &changed);
   if (status == QMAT_OK) status = qmat_topology_of_medial(s->context, changed, &after);
   if (status == QMAT_OK && after.known && after.components == before->components &&
@@ -93,7 +94,14 @@ static qmat_status try_edit(const qmat_simplification *s, const qmat_topology *b
   }
   qmat_medial_errors_uninit(&errors);
   qmat_value_release(changed ? &changed->base : NULL);
+  qmat_arena_put_back(&s->context->arena, aside);
   return status;
+}
+
+/* Whether a new sphere may divide a simplex, whose row of ids rises. It would come last, and spheres of sheets come
+ * first: those of sheets are not divided. */
+static bool may_divide(const qmat_medial *unit, const uint32_t *row) {
+  return row[0] >= unit->sheet_sphere_count;
 }
 
 /* Whether the number of spheres that is wanted allows the edit. */
@@ -133,9 +141,12 @@ static qmat_status open_void(const qmat_simplification *s, const qmat_topology *
   qmat_status status = qmat_topology_find_walls(s->context, result->medial, &walls, &count);
   for (size_t t = 0; t < SHARES && allows(s, result, shares[t]); t++) {
     const int sides = shares[t] > 0 ? 3 : 1;
-    for (size_t i = 0; i < count && i < (size_t)(QMAT_MOST_WALLS / sides) && status == QMAT_OK && !*opened; i++) {
+    int tries = 0;
+    for (size_t i = 0; i < count && tries < QMAT_MOST_WALLS && status == QMAT_OK && !*opened; i++) {
       uint32_t wall[3];
       memcpy(wall, &result->medial->triangles[3 * (size_t)walls[i]], sizeof wall);
+      if (shares[t] > 0 && !may_divide(result->medial, wall)) continue;
+      tries += sides;
       for (int k = 0; k < sides && status == QMAT_OK && !*opened; k++)
         status = try_wall(s, before, wall, shares[t], k, result, opened);
     }
@@ -156,23 +167,27 @@ qmat_status qmat_simplification_open_voids(const qmat_simplification *s, qmat_si
 
 /* ---- loops ---- */
 
-/* Fills three edges without a slab that form a loop. */
+/* Fills three edges without a slab that form a loop. The first ones whose slab stays near the solid are tried. */
 static qmat_status fill_loop(const qmat_simplification *s, const qmat_topology *before, qmat_simplified *result,
                              bool *closed) {
   const double epsilon = s->params.epsilon;
   const qmat_medial *unit = result->medial;
   uint32_t *triangles;
   size_t count;
+  int tries = 0;
   *closed = false;
   qmat_status status = qmat_topology_find_empty_triangles(s->context, unit, &triangles, &count);
-  for (size_t i = 0; i < count && status == QMAT_OK && !*closed; i++) {
+  for (size_t i = 0; i < count && tries < QMAT_MOST_WALLS && status == QMAT_OK && !*closed; i++) {
+    if ((status = qmat_progress(s->context, 0, 0, "loops")) != QMAT_OK) return status;
     edit e = {.new_triangle_count = 1};
     const double *spheres[3];
     memcpy(e.new_triangles[0], &triangles[3 * i], sizeof e.new_triangles[0]);
     for (size_t k = 0; k < 3; k++) spheres[k] = &unit->spheres[4 * (size_t)e.new_triangles[0][k]];
     const double error = qmat_envelope_to_surface_bound(s->surface, spheres, 3, qmat_least_reported * epsilon,
                                                         qmat_error_tolerance * epsilon);
-    if (error <= epsilon) status = try_edit(s, before, &e, result, closed);
+    if (!(error <= epsilon)) continue;
+    tries++;
+    status = try_edit(s, before, &e, result, closed);
     if (*closed) result->figures.envelope_to_surface = fmax(result->figures.envelope_to_surface, error);
   }
   return status;
@@ -212,6 +227,7 @@ static qmat_status cut_loop(const qmat_simplification *s, const qmat_topology *b
     for (size_t i = 0; i < ends * count && status == QMAT_OK && !*closed; i++) {
       const uint32_t *row = &unit->edges[2 * (size_t)edges[i / ends]], edge[2] = {row[0], row[1]};
       const uint32_t kept = row[i % ends], cut = row[1 - i % ends];
+      if (shares[n] > 0 && !may_divide(unit, edge)) continue;
       double sphere[4];
       for (size_t k = 0; k < 4; k++)
         sphere[k] =

@@ -54,12 +54,10 @@ typedef struct decimation {
 /* ---- geometry ---- */
 
 static double point_to_segment(const double p[3], const double a[3], const double b[3]) {
-  double ab[3], ap[3];
-  qmat_subtract(b, a, ab);
-  qmat_subtract(p, a, ap);
-  const double along = qmat_dot(ab, ab) > 0 ? fmin(fmax(qmat_dot(ap, ab) / qmat_dot(ab, ab), 0), 1) : 0;
-  for (int k = 0; k < 3; k++) ap[k] -= along * ab[k];
-  return qmat_dot(ap, ap);
+  double off[3];
+  const double along = qmat_closest_on_segment(p, a, b);
+  for (int k = 0; k < 3; k++) off[k] = p[k] - a[k] - along * (b[k] - a[k]);
+  return qmat_dot(off, off);
 }
 
 /* The squared distance from a point to the triangle with these corners, 3 doubles each. */
@@ -195,31 +193,51 @@ static bool goes_on(void *user) {
 
 /* ---- the whole surface ---- */
 
-/* The largest |F| at the samples of each triangle, to `worst` unless that is NULL; returns the largest of all. */
-static double measure(const decimation *d, const qmat_skin_triangles *surface, double *worst) {
-  const int threads = qmat_threads(d->context);
-  double most = 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : most)
-  for (size_t t = 0; t < surface->triangle_count; t++) {
-    double corners[9], point[3], of_triangle = 0;
-    for (size_t c = 0; c < 3; c++)
-      memcpy(corners + 3 * c, surface->positions + 3 * (size_t)surface->triangles[3 * t + c], 3 * sizeof *corners);
-    if (worst) {
-      sample_of(corners, 1, 1, point);
-      of_triangle = fabs(qmat_envelope_distance(d->envelope, point, NULL));
-      for (int c = 0; c < 3; c++)
-        of_triangle = fmax(of_triangle, fabs(qmat_envelope_distance(d->envelope, corners + (ptrdiff_t)3 * c, NULL)));
-      worst[t] = of_triangle;
-      continue;
-    }
-    for (int i = 0; i <= PARTS; i++)
-      for (int j = 0; i + j <= PARTS; j++) {
-        sample_of(corners, i, j, point);
-        of_triangle = fmax(of_triangle, fabs(qmat_envelope_distance(d->envelope, point, NULL)));
-      }
-    most = fmax(most, of_triangle);
-  }
+/* So many triangles are measured between two questions whether to go on. */
+static const size_t MEASURED_SLICE = 1 << 11;
+
+/* The largest |F| at a triangle's corners and at a point of its middle. */
+static double few_samples(const decimation *d, const double corners[9]) {
+  double point[3];
+  sample_of(corners, 1, 1, point);
+  double most = fabs(qmat_envelope_distance(d->envelope, point, NULL));
+  for (int c = 0; c < 3; c++)
+    most = fmax(most, fabs(qmat_envelope_distance(d->envelope, corners + (ptrdiff_t)3 * c, NULL)));
   return most;
+}
+
+/* The largest |F| at all samples of a triangle. */
+static double all_samples(const decimation *d, const double corners[9]) {
+  double point[3], most = 0;
+  for (int i = 0; i <= PARTS; i++)
+    for (int j = 0; i + j <= PARTS; j++) {
+      sample_of(corners, i, j, point);
+      most = fmax(most, fabs(qmat_envelope_distance(d->envelope, point, NULL)));
+    }
+  return most;
+}
+
+/* Measures |F| at a few samples of each triangle, to `worst`, or with NULL at all samples; `*most` is the largest. */
+static qmat_status measure(const decimation *d, const qmat_skin_triangles *surface, double *worst, double *most) {
+  const int threads = qmat_threads(d->context);
+  const size_t count = surface->triangle_count;
+  double largest = 0;
+  for (size_t begin = 0; begin < count; begin += MEASURED_SLICE) {
+    const size_t end = count - begin < MEASURED_SLICE ? count : begin + MEASURED_SLICE;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : largest)
+    for (size_t t = begin; t < end; t++) {
+      double corners[9];
+      for (size_t c = 0; c < 3; c++)
+        memcpy(corners + 3 * c, surface->positions + 3 * (size_t)surface->triangles[3 * t + c], 3 * sizeof *corners);
+      const double found = worst ? few_samples(d, corners) : all_samples(d, corners);
+      if (worst) worst[t] = found;
+      largest = fmax(largest, found);
+    }
+    const qmat_status status = qmat_progress(d->context, end, count, "measured triangles");
+    if (status != QMAT_OK) return status;
+  }
+  *most = largest;
+  return QMAT_OK;
 }
 
 static qmat_status start(decimation *d, const qmat_skin_triangles *surface) {
@@ -239,7 +257,9 @@ static qmat_status start(decimation *d, const qmat_skin_triangles *surface) {
       !d->worst)
     return qmat_fail_memory(d->context, "the skin");
   memcpy(d->points, surface->positions, 3 * d->point_count * sizeof *d->points);
-  measure(d, surface, d->worst);
+  double most;
+  const qmat_status status = measure(d, surface, d->worst, &most);
+  if (status != QMAT_OK) return status;
   for (size_t p = 0; p < d->point_count; p++) d->next[p] = NONE;
   for (size_t f = 0; f < d->face_count; f++) d->first[f] = NONE;
   /* Each vertex belongs to the last of its triangles. */
@@ -294,6 +314,6 @@ qmat_status qmat_skin_decimate(qmat_context *context, const qmat_envelope *envel
     status = decimate(&d, most, surface, errors);
     if (status == QMAT_OK && surface->triangle_count > most) status = thin(context, error, most, surface);
   }
-  if (status == QMAT_OK) errors->to_envelope = measure(&d, surface, NULL);
+  if (status == QMAT_OK) status = measure(&d, surface, NULL, &errors->to_envelope);
   return status;
 }

@@ -12,6 +12,7 @@
 
 #include "core/geometry/medial_distance.h"
 #include "core/hash.h"
+#include "tests/medial_distances.h"
 #include "tests/shapes.h"
 
 #define EXACT 1e-14
@@ -52,11 +53,11 @@ static double brute(const random_medial *m, const double p[3]) {
   const double *s = m->spheres;
   for (size_t i = 0; i < m->sphere_count; i++) best = fmin(best, qmat_sphere_distance(s + 4 * i, p));
   for (size_t i = 0; i < m->edge_count; i++) {
-    best = fmin(best, qmat_cone_distance(s + 4 * (size_t)m->edges[2 * i], s + 4 * (size_t)m->edges[2 * i + 1], p));
+    best = fmin(best, cone_distance(s + 4 * (size_t)m->edges[2 * i], s + 4 * (size_t)m->edges[2 * i + 1], p));
   }
   for (size_t i = 0; i < m->triangle_count; i++) {
     const uint32_t *t = m->triangles + 3 * i;
-    best = fmin(best, qmat_slab_distance(s + 4 * (size_t)t[0], s + 4 * (size_t)t[1], s + 4 * (size_t)t[2], p));
+    best = fmin(best, slab_distance(s + 4 * (size_t)t[0], s + 4 * (size_t)t[1], s + 4 * (size_t)t[2], p));
   }
   return best;
 }
@@ -112,8 +113,8 @@ static void test_the_minimum_matches_brute_force(void **unused) {
       const double *a = m.spheres + 4 * (size_t)ids[0];
       const double *b = m.spheres + 4 * (size_t)ids[count > 1 ? 1 : 0];
       const double *c = m.spheres + 4 * (size_t)ids[count > 2 ? 2 : 0];
-      assert_exact(count == 3   ? qmat_slab_distance(a, b, c, p)
-                   : count == 2 ? qmat_cone_distance(a, b, p)
+      assert_exact(count == 3   ? slab_distance(a, b, c, p)
+                   : count == 2 ? cone_distance(a, b, p)
                                 : qmat_sphere_distance(a, p),
                    wanted);
       assert_exact(qmat_envelope_distance_within(envelope, p, got + 1e-9), wanted);
@@ -153,8 +154,8 @@ static void test_the_bound_over_a_hull_is_the_largest_distance_of_a_corner_to_on
     for (int k = 0; k < 3; k++) s[k] = &m.spheres[4 * (size_t)ids[k < count ? k : 0]];
     double wanted = -INFINITY;
     for (int c = 0; c < 3; c++)
-      wanted = fmax(wanted, count == 3   ? qmat_slab_distance(s[0], s[1], s[2], corners[c])
-                            : count == 2 ? qmat_cone_distance(s[0], s[1], corners[c])
+      wanted = fmax(wanted, count == 3   ? slab_distance(s[0], s[1], s[2], corners[c])
+                            : count == 2 ? cone_distance(s[0], s[1], corners[c])
                                          : qmat_sphere_distance(s[0], corners[c]));
     assert_exact(bound, wanted);
     for (size_t w = 0; w < 10; w++) {

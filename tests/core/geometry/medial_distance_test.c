@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_primitive.h"
+#include "tests/medial_distances.h"
 #include "tests/shapes.h"
 
 #define EXACT 4e-13
@@ -98,22 +99,22 @@ static void test_hand_computed_distances(void **unused) {
   assert_near(qmat_sphere_distance(s, (double[3]){1, 2, 3}), -0.5, 0);
   /* A cylinder of radius 1 and length 4 with round caps. */
   const double a[4] = {0, 0, 0, 1}, b[4] = {4, 0, 0, 1};
-  assert_near(qmat_cone_distance(a, b, (double[3]){2, 3, 0}), 2, 0);
-  assert_near(qmat_cone_distance(a, b, (double[3]){2, 0, 0}), -1, 0);
-  assert_near(qmat_cone_distance(a, b, (double[3]){7, 4, 0}), 4, 0);
+  assert_near(cone_distance(a, b, (double[3]){2, 3, 0}), 2, 0);
+  assert_near(cone_distance(a, b, (double[3]){2, 0, 0}), -1, 0);
+  assert_near(cone_distance(a, b, (double[3]){7, 4, 0}), 4, 0);
   /* slope 3/5: the tangent line at a has normal (-3/5, 4/5). */
   const double c[4] = {5, 0, 0, 4};
-  assert_near(qmat_cone_distance(a, c, (double[3]){-0.6 + 4 * 0.8 / 2, 0.8 + 3 * 0.8 / 2, 0}), 0, 1e-15);
-  assert_near(qmat_cone_distance(a, c, (double[3]){-0.6 + 1.6 - 1.2, 2 + 1.6, 0}), 2, 1e-15);
+  assert_near(cone_distance(a, c, (double[3]){-0.6 + 4 * 0.8 / 2, 0.8 + 3 * 0.8 / 2, 0}), 0, 1e-15);
+  assert_near(cone_distance(a, c, (double[3]){-0.6 + 1.6 - 1.2, 2 + 1.6, 0}), 2, 1e-15);
   /* A slab of equal radii is a thick plate. */
   const double d[4] = {0, 4, 0, 1};
-  assert_near(qmat_slab_distance(a, b, d, (double[3]){1, 1, 3}), 2, 1e-15);
-  assert_near(qmat_slab_distance(a, b, d, (double[3]){1, 1, 0.25}), -0.75, 1e-15);
-  assert_near(qmat_slab_distance(a, b, d, (double[3]){-3, -4, 0}), 4, 1e-15);
-  assert_near(qmat_slab_distance(a, b, d, (double[3]){5, 5, 0}), sqrt(18) - 1, 1e-15);
+  assert_near(slab_distance(a, b, d, (double[3]){1, 1, 3}), 2, 1e-15);
+  assert_near(slab_distance(a, b, d, (double[3]){1, 1, 0.25}), -0.75, 1e-15);
+  assert_near(slab_distance(a, b, d, (double[3]){-3, -4, 0}), 4, 1e-15);
+  assert_near(slab_distance(a, b, d, (double[3]){5, 5, 0}), sqrt(18) - 1, 1e-15);
   /* Radii 1, 1, 3.4 over a leg of 4: gradient 0.6, tangent normal (0, -0.6, 0.8) through a. */
   const double e[4] = {0, 4, 0, 3.4};
-  assert_near(qmat_slab_distance(a, b, e, (double[3]){1, 1 - 0.6 * 2.1, 0.8 * 2.1}), 0.5, 1e-14);
+  assert_near(slab_distance(a, b, e, (double[3]){1, 1 - 0.6 * 2.1, 0.8 * 2.1}), 0.5, 1e-14);
 }
 
 static void random_sphere(double s[4]) {
@@ -128,7 +129,7 @@ static void test_cones_match_brute_force(void **unused) {
   for (int i = 0; i < 20000; i++) {
     double a[4], b[4], p[3];
     random_sphere(a), random_sphere(b), point_in(p, 1);
-    assert_near(qmat_cone_distance(a, b, p), brute_cone(a, b, p), EXACT);
+    assert_near(cone_distance(a, b, p), brute_cone(a, b, p), EXACT);
   }
 }
 
@@ -161,14 +162,14 @@ static void test_contained_spheres_give_the_larger_sphere(void **unused) {
     double reach = 0;
     for (int k = 0; k < 3; k++) reach += fabs(a[k] - b[k]) + fabs(a[k] - c[k]);
     a[3] = fmax(b[3], c[3]) + reach;
-    assert_near(qmat_cone_distance(a, b, p), qmat_sphere_distance(a, p), 0);
-    assert_near(qmat_cone_distance(b, a, p), qmat_sphere_distance(a, p), 0);
-    assert_near(qmat_slab_distance(b, a, c, p), qmat_sphere_distance(a, p), EXACT);
+    assert_near(cone_distance(a, b, p), qmat_sphere_distance(a, p), 0);
+    assert_near(cone_distance(b, a, p), qmat_sphere_distance(a, p), 0);
+    assert_near(slab_distance(b, a, c, p), qmat_sphere_distance(a, p), EXACT);
   }
   /* Internally tangent spheres. */
   const double a[4] = {0, 0, 0, 1}, b[4] = {0.5, 0, 0, 0.5}, p[3] = {2, 0, 0};
-  assert_near(qmat_cone_distance(a, b, p), 1, 0);
-  assert_near(qmat_cone_distance(b, a, p), 1, 0);
+  assert_near(cone_distance(a, b, p), 1, 0);
+  assert_near(cone_distance(b, a, p), 1, 0);
 }
 
 static void test_coincident_centres_give_the_larger_radius(void **unused) {
@@ -180,12 +181,12 @@ static void test_coincident_centres_give_the_larger_radius(void **unused) {
     memcpy(b, a, sizeof a);
     b[3] = uniform(0, 0.5);
     const double *larger = a[3] > b[3] ? a : b;
-    assert_near(qmat_cone_distance(a, b, p), qmat_sphere_distance(larger, p), 0);
-    assert_near(qmat_slab_distance(a, b, c, p), qmat_cone_distance(larger, c, p), EXACT);
-    assert_near(qmat_slab_distance(a, c, b, p), qmat_cone_distance(larger, c, p), EXACT);
-    assert_near(qmat_slab_distance(a, b, c, p), brute_slab(a, b, c, p), EXACT);
+    assert_near(cone_distance(a, b, p), qmat_sphere_distance(larger, p), 0);
+    assert_near(slab_distance(a, b, c, p), cone_distance(larger, c, p), EXACT);
+    assert_near(slab_distance(a, c, b, p), cone_distance(larger, c, p), EXACT);
+    assert_near(slab_distance(a, b, c, p), brute_slab(a, b, c, p), EXACT);
     memcpy(c, a, sizeof a);
-    assert_near(qmat_slab_distance(a, b, c, p), qmat_sphere_distance(larger, p), EXACT);
+    assert_near(slab_distance(a, b, c, p), qmat_sphere_distance(larger, p), EXACT);
   }
 }
 
@@ -197,9 +198,9 @@ static void test_collinear_spheres_give_the_larger_cone(void **unused) {
     random_sphere(a), random_sphere(b), point_in(p, 1);
     for (int k = 0; k < 3; k++) c[k] = a[k] + t * (b[k] - a[k]);
     c[3] = uniform(0, 0.4);
-    double cones = fmin(qmat_cone_distance(a, b, p), fmin(qmat_cone_distance(b, c, p), qmat_cone_distance(a, c, p)));
-    assert_near(qmat_slab_distance(a, b, c, p), cones, EXACT);
-    assert_near(qmat_slab_distance(a, b, c, p), brute_slab(a, b, c, p), EXACT);
+    double cones = fmin(cone_distance(a, b, p), fmin(cone_distance(b, c, p), cone_distance(a, c, p)));
+    assert_near(slab_distance(a, b, c, p), cones, EXACT);
+    assert_near(slab_distance(a, b, c, p), brute_slab(a, b, c, p), EXACT);
   }
 }
 
@@ -214,7 +215,7 @@ static void test_slivers_match_brute_force(void **unused) {
     c[3] = fmax(a[3] + t * (b[3] - a[3]) + uniform(-1, 1) * h, 0);
     if (i % 2)
       for (int k = 0; k < 3; k++) p[k] = a[k] + t * (b[k] - a[k]) + uniform(-2, 2) * h;
-    assert_near(qmat_slab_distance(a, b, c, p), brute_slab(a, b, c, p), EXACT);
+    assert_near(slab_distance(a, b, c, p), brute_slab(a, b, c, p), EXACT);
   }
 }
 
@@ -231,7 +232,7 @@ static void test_steep_radii_match_brute_force(void **unused) {
     }
     point_in(p, 1);
     if (i % 2) p[2] *= 1e-3;
-    assert_near(qmat_slab_distance(s[0], s[1], s[2], p), brute_slab(s[0], s[1], s[2], p), 2e-12);
+    assert_near(slab_distance(s[0], s[1], s[2], p), brute_slab(s[0], s[1], s[2], p), 2e-12);
   }
 }
 
@@ -244,9 +245,9 @@ static void test_points_on_the_medial_simplex_match_brute_force(void **unused) {
     if (i % 4 == 0) y = 0;
     if (i % 8 == 0) x = 0;
     for (int k = 0; k < 3; k++) p[k] = (1 - x - y) * a[k] + x * b[k] + y * c[k];
-    assert_near(qmat_slab_distance(a, b, c, p), brute_slab(a, b, c, p), EXACT);
+    assert_near(slab_distance(a, b, c, p), brute_slab(a, b, c, p), EXACT);
     for (int k = 0; k < 3; k++) p[k] = (1 - x) * a[k] + x * b[k];
-    assert_near(qmat_cone_distance(a, b, p), brute_cone(a, b, p), EXACT);
+    assert_near(cone_distance(a, b, p), brute_cone(a, b, p), EXACT);
   }
 }
 
@@ -259,11 +260,11 @@ static void test_the_order_of_the_spheres_does_not_matter(void **unused) {
     for (int j = 0; j < 3; j++) random_sphere(s[j]);
     if (i % 5 == 0) memcpy(s[1], s[0], sizeof s[0]);
     point_in(p, 1);
-    double cone = qmat_cone_distance(s[0], s[1], p), slab = qmat_slab_distance(s[0], s[1], s[2], p);
-    assert_near(qmat_cone_distance(s[1], s[0], p), cone, EXACT);
+    double cone = cone_distance(s[0], s[1], p), slab = slab_distance(s[0], s[1], s[2], p);
+    assert_near(cone_distance(s[1], s[0], p), cone, EXACT);
     for (int k = 0; k < 6; k++) {
       const int *o = orders[k];
-      assert_near(qmat_slab_distance(s[o[0]], s[o[1]], s[o[2]], p), slab, EXACT);
+      assert_near(slab_distance(s[o[0]], s[o[1]], s[o[2]], p), slab, EXACT);
     }
   }
 }
@@ -285,8 +286,8 @@ static void test_rotation_does_not_matter(void **unused) {
                             {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
     for (int j = 0; j < 3; j++) random_sphere(s[j]), turn(m, s[j], t[j]), t[j][3] = s[j][3];
     point_in(p, 1), turn(m, p, r);
-    assert_near(qmat_cone_distance(t[0], t[1], r), qmat_cone_distance(s[0], s[1], p), EXACT);
-    assert_near(qmat_slab_distance(t[0], t[1], t[2], r), qmat_slab_distance(s[0], s[1], s[2], p), EXACT);
+    assert_near(cone_distance(t[0], t[1], r), cone_distance(s[0], s[1], p), EXACT);
+    assert_near(slab_distance(t[0], t[1], t[2], r), slab_distance(s[0], s[1], s[2], p), EXACT);
   }
 }
 
@@ -302,12 +303,12 @@ static void test_distances_are_1_lipschitz_and_convex(void **unused) {
       step += (p[k] - q[k]) * (p[k] - q[k]);
     }
     step = sqrt(step);
-    double fp = qmat_slab_distance(a, b, c, p), fq = qmat_slab_distance(a, b, c, q);
+    double fp = slab_distance(a, b, c, p), fq = slab_distance(a, b, c, q);
     assert_true(fabs(fp - fq) <= step + EXACT);
-    assert_true(qmat_slab_distance(a, b, c, m) <= 0.5 * (fp + fq) + EXACT);
-    fp = qmat_cone_distance(a, b, p), fq = qmat_cone_distance(a, b, q);
+    assert_true(slab_distance(a, b, c, m) <= 0.5 * (fp + fq) + EXACT);
+    fp = cone_distance(a, b, p), fq = cone_distance(a, b, q);
     assert_true(fabs(fp - fq) <= step + EXACT);
-    assert_true(qmat_cone_distance(a, b, m) <= 0.5 * (fp + fq) + EXACT);
+    assert_true(cone_distance(a, b, m) <= 0.5 * (fp + fq) + EXACT);
   }
 }
 
@@ -368,9 +369,8 @@ static void test_small_models_keep_relative_precision(void **unused) {
     point_in(p, 1);
     for (int k = 0; k < 3; k++) q[k] = p[k] * 0x1p-60;
     /* Scaling by a power of two changes no digit. */
-    assert_near(qmat_slab_distance(small[0], small[1], small[2], q) * 0x1p60, qmat_slab_distance(s[0], s[1], s[2], p),
-                0);
-    assert_near(qmat_cone_distance(small[0], small[1], q) * 0x1p60, qmat_cone_distance(s[0], s[1], p), 0);
+    assert_near(slab_distance(small[0], small[1], small[2], q) * 0x1p60, slab_distance(s[0], s[1], s[2], p), 0);
+    assert_near(cone_distance(small[0], small[1], q) * 0x1p60, cone_distance(s[0], s[1], p), 0);
   }
 }
 

@@ -85,7 +85,38 @@ static void test_equal_items_are_run_once_and_have_the_same_result(void **state)
   qmat_context_uninit(&context);
 }
 
+static void test_items_whose_digests_begin_alike_are_told_apart(void **state) {
+  (void)state;
+  enum { COUNT = 40 };
+  double firsts[COUNT], seconds[COUNT];
+  for (int i = 0; i < COUNT; i++) {
+    firsts[i] = i % 30;
+    seconds[i] = 100;
+  }
+  qmat_context context = {.threads = 2};
+  qmat_graph graph;
+  qmat_run run = {0};
+  test_ok(&context, test_read(&context, sum_graph, &graph));
+  test_ok(&context, qmat_run_plan(&context, &graph, &(qmat_run_options){0}, &run));
+  size_t step = 0, calls = 0;
+  while (run.graph->nodes[run.steps[step].node].type != &test_add) step++;
+  qmat_list *first = make_list(firsts, COUNT), *second = make_list(seconds, COUNT);
+  for (size_t i = 0; i < COUNT; i++) memset(first->items[i]->digest.bytes, 0xff, 8);
+  const qmat_value *inputs[] = {&first->base, &second->base};
+  qmat_value *output = NULL;
+  test_ok(&context, qmat_run_lifted(&context, &run, step, inputs, first, add, &calls, &output));
+  assert_int_equal(calls, 30);
+  for (size_t i = 0; i < COUNT; i++) assert_true(test_value(qmat_value_at(output, i)) == firsts[i] + 100);
+  qmat_value_release(output);
+  qmat_value_release(&first->base);
+  qmat_value_release(&second->base);
+  qmat_run_uninit(&run);
+  qmat_graph_uninit(&graph);
+  qmat_context_uninit(&context);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_equal_items_are_run_once_and_have_the_same_result)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_equal_items_are_run_once_and_have_the_same_result),
+                                     cmocka_unit_test(test_items_whose_digests_begin_alike_are_told_apart)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,6 +12,7 @@
 #include "core/geometry/medial_build.h"
 #include "core/geometry/medial_distance.h"
 #include "core/geometry/vector.h"
+#include "tests/medial_distances.h"
 #include "tests/random.h"
 
 #define ROUNDING 1e-12
@@ -66,8 +67,8 @@ static double depth_of(const qmat_medial *medial, const double point[3]) {
   qmat_slab slab;
   double depth = -INFINITY;
   for (size_t e = 0; e < medial->edge_count; e++)
-    depth = fmax(depth, -qmat_cone_distance(&s[4 * (size_t)medial->edges[2 * e]],
-                                            &s[4 * (size_t)medial->edges[2 * e + 1]], point));
+    depth = fmax(depth,
+                 -cone_distance(&s[4 * (size_t)medial->edges[2 * e]], &s[4 * (size_t)medial->edges[2 * e + 1]], point));
   qmat_slab_prepare(&slab, &s[4 * (size_t)medial->triangles[0]], &s[4 * (size_t)medial->triangles[1]],
                     &s[4 * (size_t)medial->triangles[2]]);
   return fmax(depth, -qmat_slab_prepared_distance(&slab, point));

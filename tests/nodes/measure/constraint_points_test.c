@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_distance.h"
+#include "tests/medial_distances.h"
 #include "tests/nodes/pipeline.h"
 
 #define ROUNDING 1e-12
@@ -52,11 +53,10 @@ static double brute_force(const qmat_complex *c, const double point[3]) {
   const double *s = c->spheres;
   for (size_t v = 0; v < c->vertex_count; v++) best = fmin(best, qmat_sphere_distance(&s[4 * v], point));
   for (size_t e = 0; e < c->edge_count; e++)
-    best = fmin(best, qmat_cone_distance(&s[4 * (size_t)c->edges[2 * e]], &s[4 * (size_t)c->edges[2 * e + 1]], point));
+    best = fmin(best, cone_distance(&s[4 * (size_t)c->edges[2 * e]], &s[4 * (size_t)c->edges[2 * e + 1]], point));
   for (size_t t = 0; t < c->triangle_count; t++) {
     const uint32_t *ids = &c->triangles[3 * t];
-    best =
-        fmin(best, qmat_slab_distance(&s[4 * (size_t)ids[0]], &s[4 * (size_t)ids[1]], &s[4 * (size_t)ids[2]], point));
+    best = fmin(best, slab_distance(&s[4 * (size_t)ids[0]], &s[4 * (size_t)ids[1]], &s[4 * (size_t)ids[2]], point));
   }
   return best;
 }

@@ -12,6 +12,7 @@
 #include "core/geometry/envelope.h"
 #include "core/geometry/medial_build.h"
 #include "nodes/measure/constraint_points.h"
+#include "tests/medial_distances.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
 
@@ -308,12 +309,12 @@ static void check_refusal(model *m, const double sphere[4]) {
   assert_true(qmat_sphere_distance(sphere, point) > limit);
   for (size_t n = 0; n < m->collapse.neighbour_count; n++) {
     const double *other = &m->complex.spheres[4 * (size_t)m->collapse.neighbours[n]];
-    assert_true(qmat_cone_distance(sphere, other, point) > limit);
+    assert_true(cone_distance(sphere, other, point) > limit);
   }
   for (size_t t = 0; t < m->collapse.triangle_count; t++) {
     const uint32_t *pair = &m->collapse.triangle_pairs[2 * t];
-    assert_true(qmat_slab_distance(sphere, &m->complex.spheres[4 * (size_t)pair[0]],
-                                   &m->complex.spheres[4 * (size_t)pair[1]], point) > limit);
+    assert_true(slab_distance(sphere, &m->complex.spheres[4 * (size_t)pair[0]],
+                              &m->complex.spheres[4 * (size_t)pair[1]], point) > limit);
   }
   bool served = false;
   for (size_t k = 0; k < 3; k++) {

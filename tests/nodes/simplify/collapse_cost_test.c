@@ -12,6 +12,7 @@
 
 #include "core/geometry/medial_build.h"
 #include "nodes/simplify/medial_quadrics.h"
+#include "tests/medial_distances.h"
 #include "tests/random.h"
 #include "tests/shapes.h"
 
@@ -159,14 +160,14 @@ static double distance_after(const fixture *f, uint32_t kept, uint32_t removed, 
       const uint32_t v = f->complex.triangles[3 * t + k];
       at[k] = v == kept || v == removed ? sphere : &f->complex.spheres[4 * (size_t)v];
     }
-    least = fmin(least, qmat_slab_distance(at[0], at[1], at[2], point));
+    least = fmin(least, slab_distance(at[0], at[1], at[2], point));
   }
   for (size_t e = 0; e < f->complex.edge_count; e++) {
     for (size_t k = 0; k < 2; k++) {
       const uint32_t v = f->complex.edges[2 * e + k];
       at[k] = v == kept || v == removed ? sphere : &f->complex.spheres[4 * (size_t)v];
     }
-    least = fmin(least, qmat_cone_distance(at[0], at[1], point));
+    least = fmin(least, cone_distance(at[0], at[1], point));
   }
   return least;
 }

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_build.h"
+#include "tests/medial_distances.h"
 
 /* A chain of three spheres on the x-axis inside the capsule of radius 1 from x = 0 to 4, whose surface is sampled. The
  * edge between the first two is to collapse; the third sphere is wrong. */
@@ -116,19 +117,19 @@ static void test_places_get_what_is_asked_of_them(void **state) {
   assert_int_equal(qmat_neighbourhood_fit_add(&c.context, &c.fit, beside, QMAT_TARGET_INSIDE, 0), QMAT_OK);
   qmat_neighbourhood_fit_run(&c.fit, &c.complex, false, &error);
   assert_true(error <= c.fit.threshold);
-  assert_true(qmat_cone_distance(c.fit.spheres[0], c.fit.spheres[1], beside) <= 0);
+  assert_true(cone_distance(c.fit.spheres[0], c.fit.spheres[1], beside) <= 0);
   free_chain(&c);
 
   make_chain(&c, SPHERES);
   fit_closely(&c);
   /* F is -0.06 here, inside the capsule; it has to be -0.05 at least. */
   static const double border[3] = {2, 0, 0.94};
-  before = qmat_cone_distance(c.fit.spheres[0], c.fit.spheres[1], border);
+  before = cone_distance(c.fit.spheres[0], c.fit.spheres[1], border);
   assert_true(before < -0.055);
   assert_int_equal(qmat_neighbourhood_fit_add(&c.context, &c.fit, border, QMAT_TARGET_BORDER, 0.05), QMAT_OK);
   qmat_neighbourhood_fit_run(&c.fit, &c.complex, false, &error);
   assert_true(error <= c.fit.threshold);
-  assert_true(qmat_cone_distance(c.fit.spheres[0], c.fit.spheres[1], border) >= -0.05);
+  assert_true(cone_distance(c.fit.spheres[0], c.fit.spheres[1], border) >= -0.05);
   free_chain(&c);
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef QMAT_NODES_MESH_HALF_EDGES_H
-#define QMAT_NODES_MESH_HALF_EDGES_H
+#ifndef QMAT_CORE_GEOMETRY_HALF_EDGES_H
+#define QMAT_CORE_GEOMETRY_HALF_EDGES_H
 
 #include "core/context.h"
 
@@ -10,6 +10,7 @@ typedef struct qmat_half_edges {
   const uint32_t *triangles;
   size_t count;    /* 3 per triangle, below 2^32 */
   uint32_t *order; /* count: by lower end, higher end, number */
+  uint32_t *spare; /* count: what sorting has left, for any use */
 } qmat_half_edges;
 
 static inline uint32_t qmat_half_edge_start(const qmat_half_edges *e, uint32_t h) {
@@ -47,7 +48,7 @@ static inline size_t qmat_edge_last(const qmat_half_edges *e, size_t first) {
 static inline qmat_status qmat_half_edges_sort(qmat_context *context, size_t vertex_count, size_t triangle_count,
                                                const uint32_t *triangles, qmat_half_edges *e) {
   qmat_arena *arena = &context->arena;
-  *e = (qmat_half_edges){triangles, 3 * triangle_count, NULL};
+  *e = (qmat_half_edges){triangles, 3 * triangle_count, NULL, NULL};
   uint32_t *order = (uint32_t *)qmat_arena_alloc(arena, e->count, sizeof *order),
            *swap = (uint32_t *)qmat_arena_alloc(arena, e->count, sizeof *swap);
   size_t *starts = (size_t *)qmat_arena_alloc(arena, vertex_count + 1, sizeof *starts);
@@ -64,6 +65,7 @@ static inline qmat_status qmat_half_edges_sort(qmat_context *context, size_t ver
     }
   }
   e->order = order;
+  e->spare = swap;
   return QMAT_OK;
 }
 
