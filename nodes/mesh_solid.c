@@ -12,11 +12,11 @@
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/mesh/border_weld.h"
-#include "nodes/mesh/half_edges.h"
 #include "nodes/mesh/hole_cgal.h"
 #include "nodes/mesh/lend_joints.h"
+#include "nodes/mesh/opposite_pairs.h"
 #include "nodes/mesh/overlaps.h"
-#include "nodes/mesh/parts.h"
+#include "nodes/mesh/seams.h"
 #include "nodes/mesh/triangle_cover.h"
 #include "nodes/mesh/wrap_cgal.h"
 
@@ -34,6 +34,10 @@ static const double least_wrap_epsilon = 0.004;
 /* Border vertices this close are one, in diagonals: coordinates of single precision that were moved or rounded again.
  */
 static const double weld_tolerance = 1e-5;
+/* Borders that run along each other at most this share of epsilon apart are a seam. */
+static const double seam_width = 0.2;
+/* Caps of more than this share of the area that a component is given with are worth a warning. */
+static const double most_capped = 0.1;
 /* A triangle that the union leaves out is within it if it sticks out by at most this, in diagonals: rounding. */
 static const double least_gap = 1e-9;
 /* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
@@ -58,15 +62,17 @@ typedef struct solidifier {
   size_t triangle_count;     /* those that are left after welding; without the given sheets' */
   const uint32_t *triangles; /* 3 * triangle_count */
   qmat_border_weld weld;
-  size_t plain_count, pair_count; /* triangles without and with an opposite one, the latter once for each pair */
-  uint32_t *plain, *pairs;        /* their corners */
+  qmat_pair_split split;
+  size_t plain_count,
+      pair_count;          /* triangles that may bound solids; the first of each opposite pair, and given sheets */
+  uint32_t *plain, *pairs; /* their corners */
   qmat_parts parts;
   double *cap_areas; /* per loop */
   uint8_t *turned;   /* per part: it is turned inside out */
   triangle_list solids, sheets;
   double *beside_solids; /* the vertices in the frame of the surface of the solids */
-  size_t given_count;    /* of the solids' triangles; behind these are the caps */
-  size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
+  size_t given_count;    /* of the solids' triangles; behind these are seams and caps */
+  size_t seam_triangles, caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
   double cap_length, cap_area;
   qmat_united united;
   qmat_wrap wrap;
@@ -97,53 +103,20 @@ static qmat_status append(const solidifier *s, triangle_list *list, uint32_t a, 
 
 /* ---- opposite triangles ---- */
 
-static uint32_t third_corner(const uint32_t *triangles, uint32_t half_edge) {
-  return triangles[half_edge - half_edge % 3 + (half_edge + 2) % 3];
-}
-
-/* Finds pairs of triangles with the same corners and opposite sides: a card of two sides, or a wall between two solids
- * that touch. They cancel in every winding number. `classes` becomes 1 for the first of a pair and 2 for the second. */
-static qmat_status find_pairs(const solidifier *s, const uint32_t *triangles, size_t count, uint8_t *classes) {
-  qmat_half_edges e;
-  const qmat_status status = qmat_half_edges_sort(s->context, s->mesh->vertex_count, count, triangles, &e);
-  for (size_t first = 0, last; status == QMAT_OK && first < e.count; first = last) {
-    last = qmat_edge_last(&e, first);
-    const uint32_t high = qmat_half_edge_high(&e, e.order[first]);
-    for (size_t i = first; i + 1 < last; i++) {
-      const uint32_t a = e.order[i], third = third_corner(e.triangles, a);
-      if (third <= high || classes[a / 3]) continue; /* each triangle once, at the edge of its lowest corners */
-      for (size_t k = i + 1; k < last; k++) {
-        const uint32_t b = e.order[k];
-        if (classes[b / 3] || third_corner(e.triangles, b) != third ||
-            qmat_half_edge_rises(&e, a) == qmat_half_edge_rises(&e, b))
-          continue;
-        classes[a / 3] = 1;
-        classes[b / 3] = 2;
-        break;
-      }
-    }
-  }
-  return status;
-}
-
 static qmat_status split_pairs(solidifier *s) {
   const qmat_mesh *mesh = s->mesh;
   const size_t sheet_count = mesh->sheet_triangle_count;
   qmat_arena *arena = &s->context->arena;
-  uint8_t *classes = qmat_arena_calloc(arena, s->triangle_count, 1);
   s->plain = qmat_arena_alloc(arena, 3 * s->triangle_count, sizeof *s->plain);
   s->pairs = qmat_arena_alloc(arena, 3 * (s->triangle_count + sheet_count), sizeof *s->pairs);
-  if (!classes || !s->plain || !s->pairs) return fail_shortage(s);
-  const qmat_status status = find_pairs(s, s->triangles, s->triangle_count, classes);
-  for (size_t t = 0; status == QMAT_OK && t < s->triangle_count; t++) {
-    if (classes[t] == 2) continue;
-    uint32_t *to = classes[t] == 1 ? s->pairs + 3 * s->pair_count++ : s->plain + 3 * s->plain_count++;
-    memcpy(to, s->triangles + 3 * t, 3 * sizeof *to);
-  }
-  if (sheet_count > 0)
-    memcpy(s->pairs + 3 * s->pair_count, mesh->triangles + 3 * (mesh->triangle_count - sheet_count),
+  if (!s->plain || !s->pairs) return fail_shortage(s);
+  const qmat_status status = qmat_split_pairs(s->context, mesh->vertex_count, s->unit, s->triangle_count, s->triangles,
+                                              s->plain, s->pairs, &s->split);
+  s->plain_count = s->split.plain_count;
+  s->pair_count = s->split.pair_count + sheet_count;
+  if (status == QMAT_OK && sheet_count > 0)
+    memcpy(s->pairs + 3 * s->split.pair_count, mesh->triangles + 3 * (mesh->triangle_count - sheet_count),
            3 * sheet_count * sizeof *s->pairs);
-  s->pair_count += sheet_count;
   return status;
 }
 
@@ -250,7 +223,7 @@ static qmat_status split_folds(solidifier *s, size_t given) {
   const size_t count = s->solids.count;
   uint8_t *classes = qmat_arena_calloc(&s->context->arena, count, 1);
   if (!classes) return fail_shortage(s);
-  qmat_status status = find_pairs(s, s->solids.corners, count, classes);
+  qmat_status status = qmat_find_opposite_pairs(s->context, s->mesh->vertex_count, count, s->solids.corners, classes);
   s->solids.count = 0;
   for (size_t t = 0; status == QMAT_OK && t < count; t++) {
     const uint32_t *c = s->solids.corners + 3 * t;
@@ -265,10 +238,11 @@ static qmat_status split_folds(solidifier *s, size_t given) {
   return status;
 }
 
-/* The triangles of solid parts, then their caps; those of sheets, then one of each pair. */
+/* The triangles of solid parts, then those in seams and caps; those of sheets, then one of each pair. */
 static qmat_status sort_triangles(solidifier *s) {
   const qmat_parts *parts = &s->parts;
   qmat_status status = QMAT_OK;
+  size_t given = 0;
   s->cap_areas = qmat_arena_calloc(&s->context->arena, parts->loop_count, sizeof *s->cap_areas);
   if (!s->cap_areas) return fail_shortage(s);
   for (size_t t = 0; status == QMAT_OK && t < parts->triangle_count; t++) {
@@ -276,14 +250,16 @@ static qmat_status sort_triangles(solidifier *s) {
     const bool turn = s->turned[parts->part_of[t]] == 1;
     triangle_list *list = is_sheet(&parts->parts[parts->part_of[t]]) ? &s->sheets : &s->solids;
     status = append(s, list, c[0], c[turn ? 2 : 1], c[turn ? 1 : 2]);
+    if (t < s->plain_count) given = s->solids.count;
   }
-  const size_t given = s->given_count = s->solids.count;
+  s->given_count = given;
   for (size_t i = 0; status == QMAT_OK && i < parts->loop_count; i++) {
     if (is_sheet(&parts->parts[parts->loops[i].part])) continue;
     status = add_cap(s, i);
     if (status == QMAT_OK) status = qmat_progress(s->context, i, parts->loop_count, "borders");
   }
-  if (status == QMAT_OK && s->caps > 0) status = split_folds(s, given);
+  if (status == QMAT_OK && s->solids.count > given) status = split_folds(s, given);
+  for (size_t i = 0; i < parts->part_count; i++) s->cap_area += parts->parts[i].seam_area;
   for (size_t t = 0; status == QMAT_OK && t < s->pair_count; t++)
     status = append(s, &s->sheets, s->pairs[3 * t], s->pairs[3 * t + 1], s->pairs[3 * t + 2]);
   return status;
@@ -479,11 +455,16 @@ static const char *const kind_names[QMAT_PART_KIND_COUNT] = {[QMAT_PART_CLOSED] 
 
 static json_t *describe_part(const solidifier *s, uint32_t number) {
   const qmat_part *part = &s->parts.parts[number];
-  json_t *caps = json_array(), *object = json_pack("{s:I,s:s,s:f}", "triangles", (json_int_t)part->triangle_count,
-                                                   "taken_for", kind_names[part->kind], "area", part->area);
+  json_t *caps = json_array(),
+         *object = json_pack("{s:I,s:s,s:f}", "triangles", (json_int_t)(part->triangle_count - part->seam_triangles),
+                             "taken_for", kind_names[part->kind], "area", part->area - part->seam_area);
   int bad = !caps || !object;
   if (!bad && s->turned[number] == 1) bad |= json_object_set_new(object, "turned", json_true());
   if (!bad && s->turned[number] == 2) bad |= json_object_set_new(object, "cavity", json_true());
+  if (!bad && part->seam_triangles > 0) {
+    bad |= qmat_json_set_count(object, "seam_triangles", part->seam_triangles);
+    bad |= json_object_set_new(object, "seam_area", json_real(part->seam_area));
+  }
   if (!bad && part->kind == QMAT_PART_HOLES) {
     bad |= qmat_json_set_count(object, "caps", part->loop_count);
     for (size_t i = 0; i < part->loop_count && i < MOST_CAPS_LISTED; i++) {
@@ -519,6 +500,27 @@ static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
                                given - left, given);
 }
 
+/* Warns where caps are a large share of a component: it may be a container. */
+static int warn_of_large_caps(const solidifier *s, json_t *root) {
+  size_t caps = 0, components = 0;
+  double largest = 0;
+  for (size_t i = 0; i < s->parts.part_count && s->params->solid == SOLID_AUTO; i++) {
+    const qmat_part *part = &s->parts.parts[i];
+    double area = 0;
+    if (part->kind != QMAT_PART_HOLES) continue;
+    for (size_t l = part->first_loop; l < part->first_loop + part->loop_count; l++) area += s->cap_areas[l];
+    if (!(area > most_capped * (part->area - part->seam_area))) continue;
+    components++;
+    caps += part->loop_count;
+    largest = fmax(largest, area / (part->area - part->seam_area));
+  }
+  if (components == 0) return 0;
+  return qmat_json_add_warning(root,
+                               "%zu openings of %zu components are closed by caps of up to %.0f %% of a component's "
+                               "area; --set solid.solid=sheet keeps all surfaces open",
+                               caps, components, 100 * largest);
+}
+
 static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_report *report) {
   json_t *root = report->root;
   size_t kinds[QMAT_PART_KIND_COUNT] = {0}, open = 0;
@@ -533,22 +535,22 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"solids_with_holes", kinds[QMAT_PART_HOLES]},
                                     {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT]},
                                     {"sheet_triangles", s->sheets.count},
-                                    {"opposite_triangles_merged", s->pair_count - s->mesh->sheet_triangle_count},
+                                    {"opposite_triangles_merged", s->split.merged},
+                                    {"two_sided_solids", s->split.two_sided_solids},
                                     {"inner_triangles", s->inner_triangles},
                                     {"unbounding_triangles", s->unbounding_triangles},
                                     {"flap_triangles", s->flaps},
                                     {"parts_turned", s->turned_parts},
                                     {"triangles_turned", s->parts.turned},
+                                    {"seam_triangles", s->seam_triangles},
                                     {"caps", s->caps},
                                     {"cap_sides", s->cap_sides},
                                     {"triangles_folded", s->folded},
                                     {"parts_united", s->united.shells_united},
                                     {"triangles_cut", s->united.cut_triangles}};
   int bad = qmat_json_set_counts(root, counts, sizeof counts / sizeof *counts);
-  if (s->caps > 0) {
-    bad |= json_object_set_new(root, "cap_length", json_real(s->cap_length));
-    bad |= json_object_set_new(root, "cap_area", json_real(s->cap_area));
-  }
+  if (s->caps > 0) bad |= json_object_set_new(root, "cap_length", json_real(s->cap_length));
+  if (s->caps + s->seam_triangles > 0) bad |= json_object_set_new(root, "cap_area", json_real(s->cap_area));
   if (s->wrap.triangles) bad |= qmat_json_set_count(root, "wrap_triangles", s->wrap.triangle_count);
   if (made) {
     bad |= qmat_json_set_count(root, "vertices", made->vertex_count);
@@ -556,6 +558,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
   }
   if (s->params->solid != SOLID_AS_IS && s->params->solid != SOLID_WRAP) bad |= report_parts(s, root);
   bad |= warn_of_hidden_solids(s, root);
+  bad |= warn_of_large_caps(s, root);
   if (s->united.why_not)
     bad |= qmat_json_add_warning(root, "the solids are wrapped: those that intersect cannot be united: %s",
                                  s->united.why_not);
@@ -571,8 +574,10 @@ static qmat_status make_solid(solidifier *s) {
   qmat_status status = weld_seams(s);
   if (status == QMAT_OK) status = split_pairs(s);
   if (status == QMAT_OK)
-    status = qmat_parts_find(s->context, s->mesh->vertex_count, s->unit, s->plain_count, s->plain, &s->parts);
+    status = qmat_parts_find_with_seams(s->context, s->mesh->vertex_count, s->unit, s->plain_count, s->plain,
+                                        s->params->solid == SOLID_SHEET ? 0 : seam_width * epsilon_of(s), &s->parts);
   if (status != QMAT_OK) return status;
+  s->seam_triangles = s->parts.triangle_count - s->plain_count;
   choose_kinds(s);
   status = turn_parts(s);
   if (status == QMAT_OK) status = sort_triangles(s);
@@ -644,7 +649,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 8,
+    .version = 9,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
