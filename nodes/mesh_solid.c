@@ -18,6 +18,7 @@
 #include "nodes/mesh/overlaps.h"
 #include "nodes/mesh/seams.h"
 #include "nodes/mesh/triangle_cover.h"
+#include "nodes/mesh/two_sides.h"
 #include "nodes/mesh/wrap_cgal.h"
 
 typedef enum solid_choice { SOLID_AUTO, SOLID_AS_IS, SOLID_CLOSE, SOLID_WRAP, SOLID_SHEET } solid_choice;
@@ -62,10 +63,10 @@ typedef struct solidifier {
   size_t triangle_count;     /* those that are left after welding; without the given sheets' */
   const uint32_t *triangles; /* 3 * triangle_count */
   qmat_border_weld weld;
-  qmat_pair_split split;
-  size_t plain_count,
-      pair_count;          /* triangles that may bound solids; the first of each opposite pair, and given sheets */
-  uint32_t *plain, *pairs; /* their corners */
+  qmat_two_sides sides;
+  size_t merged;                  /* triangles that are left out for an opposite one */
+  size_t plain_count, pair_count; /* triangles without an opposite one; the first of each pair, and given sheets */
+  uint32_t *plain, *pairs;        /* their corners */
   qmat_parts parts;
   double *cap_areas; /* per loop */
   uint8_t *turned;   /* per part: it is turned inside out */
@@ -103,20 +104,35 @@ static qmat_status append(const solidifier *s, triangle_list *list, uint32_t a, 
 
 /* ---- opposite triangles ---- */
 
+static qmat_status drop_second_sides(solidifier *s) {
+  const qmat_status status =
+      qmat_drop_second_sides(s->context, s->mesh->vertex_count, s->unit, s->triangle_count, s->triangles, &s->sides);
+  if (status != QMAT_OK || s->sides.solids == 0) return status;
+  s->triangles = s->sides.triangles;
+  s->triangle_count = s->sides.triangle_count;
+  return QMAT_OK;
+}
+
 static qmat_status split_pairs(solidifier *s) {
   const qmat_mesh *mesh = s->mesh;
   const size_t sheet_count = mesh->sheet_triangle_count;
   qmat_arena *arena = &s->context->arena;
+  uint8_t *classes = qmat_arena_calloc(arena, s->triangle_count, 1);
   s->plain = qmat_arena_alloc(arena, 3 * s->triangle_count, sizeof *s->plain);
   s->pairs = qmat_arena_alloc(arena, 3 * (s->triangle_count + sheet_count), sizeof *s->pairs);
-  if (!s->plain || !s->pairs) return fail_shortage(s);
-  const qmat_status status = qmat_split_pairs(s->context, mesh->vertex_count, s->unit, s->triangle_count, s->triangles,
-                                              s->plain, s->pairs, &s->split);
-  s->plain_count = s->split.plain_count;
-  s->pair_count = s->split.pair_count + sheet_count;
-  if (status == QMAT_OK && sheet_count > 0)
-    memcpy(s->pairs + 3 * s->split.pair_count, mesh->triangles + 3 * (mesh->triangle_count - sheet_count),
+  if (!classes || !s->plain || !s->pairs) return fail_shortage(s);
+  const qmat_status status =
+      qmat_find_opposite_pairs(s->context, mesh->vertex_count, s->triangle_count, s->triangles, classes);
+  for (size_t t = 0; status == QMAT_OK && t < s->triangle_count; t++) {
+    if (classes[t] == 2) continue;
+    uint32_t *to = classes[t] == 1 ? s->pairs + 3 * s->pair_count++ : s->plain + 3 * s->plain_count++;
+    memcpy(to, s->triangles + 3 * t, 3 * sizeof *to);
+  }
+  s->merged = s->sides.dropped + s->pair_count;
+  if (sheet_count > 0)
+    memcpy(s->pairs + 3 * s->pair_count, mesh->triangles + 3 * (mesh->triangle_count - sheet_count),
            3 * sheet_count * sizeof *s->pairs);
+  s->pair_count += sheet_count;
   return status;
 }
 
@@ -318,7 +334,7 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   for (size_t i = 0; i < 3 * s->sheets.count; i++)
     mesh->triangles[3 * triangle_count + i] = numbers[shift + s->sheets.corners[i]];
   mesh->closed = mesh->oriented = true;
-  mesh->deviation = s->mesh->deviation + s->weld.moved * s->frame.diagonal;
+  mesh->deviation = s->mesh->deviation + (s->weld.moved + s->sides.distance) * s->frame.diagonal;
   mesh->meters_per_unit = s->mesh->meters_per_unit;
   mesh->flap_triangle_count = s->flaps;
   if (s->sheets.count > 0) mesh->sheet_thickness = sheet_thickness(s);
@@ -535,8 +551,8 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"solids_with_holes", kinds[QMAT_PART_HOLES]},
                                     {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT]},
                                     {"sheet_triangles", s->sheets.count},
-                                    {"opposite_triangles_merged", s->split.merged},
-                                    {"two_sided_solids", s->split.two_sided_solids},
+                                    {"opposite_triangles_merged", s->merged},
+                                    {"two_sided_solids", s->sides.solids},
                                     {"inner_triangles", s->inner_triangles},
                                     {"unbounding_triangles", s->unbounding_triangles},
                                     {"flap_triangles", s->flaps},
@@ -572,6 +588,7 @@ static qmat_status make_solid(solidifier *s) {
   if (!s->unit) return fail_shortage(s);
   qmat_frame_to_unit(&s->frame, s->mesh->positions, s->mesh->vertex_count, s->unit);
   qmat_status status = weld_seams(s);
+  if (status == QMAT_OK) status = drop_second_sides(s);
   if (status == QMAT_OK) status = split_pairs(s);
   if (status == QMAT_OK)
     status = qmat_parts_find_with_seams(s->context, s->mesh->vertex_count, s->unit, s->plain_count, s->plain,

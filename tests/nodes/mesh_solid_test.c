@@ -1073,6 +1073,16 @@ static void test_a_card_of_two_sides_is_a_sheet_of_one(void **state) {
   }
 }
 
+/* Gives the triangles of quads a second time, turned and with the other diagonal. */
+static void give_both_sides_of_quads(qmat_mesh *mesh) {
+  const size_t count = mesh->triangle_count;
+  for (size_t t = 0; t < count; t += 2) {
+    uint32_t c[6];
+    memcpy(c, mesh->triangles + 3 * t, sizeof c);
+    shape_quad(mesh, c[5], c[2], c[1], c[0]);
+  }
+}
+
 /* Gives every triangle a second time, turned. Where `alternates`, every other turned one comes first. */
 static void give_both_sides(qmat_mesh *mesh, bool alternates) {
   const size_t count = mesh->triangle_count;
@@ -1110,6 +1120,12 @@ static void test_closed_surfaces_of_two_sides_are_solids(void **state) {
   shape_add_box(mesh, 1, 1, 1, 2, 2, 2, true);
   give_both_sides(mesh, false);
   check_two_sided(mesh, 27 - 1, 24, 24, 2);
+  mesh = shape_box(1, 2, 3); /* of quads, beside a box that is given once, and a card */
+  for (int i = 0; i < 4; i++) shape_vertex(mesh, 5, i & 1, i & 2);
+  shape_quad(mesh, 8, 9, 11, 10);
+  give_both_sides_of_quads(mesh);
+  shape_add_box(mesh, 2, 0, 0, 3, 1, 1, false);
+  check_two_sided(mesh, 6 + 1, 24, 12, 1);
   mesh = shape_box(3, 3, 3); /* what fills the cavity makes its sides walls inside */
   shape_add_box(mesh, 1, 1, 1, 2, 2, 2, true);
   shape_add_box(mesh, 1, 1, 1, 2, 2, 2, false);
