@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* mesh.solid: a solid out of any triangles, and sheets of those that enclose nothing. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/disjoint_sets.h"
@@ -32,8 +31,7 @@ typedef struct mesh_solid_params {
 static const double wrap_offset = 0.25, wrap_alpha = 4;
 /* The least epsilon that a wrap is made for, in diagonals; its triangles grow with the inverse square. */
 static const double least_wrap_epsilon = 0.004;
-/* Border vertices this close are one, in diagonals: coordinates of single precision that were moved or rounded again.
- */
+/* Border vertices this close are one, in diagonals: coordinates of single precision that were rounded again. */
 static const double weld_tolerance = 1e-5;
 /* Borders that run along each other at most this share of epsilon apart are a seam. */
 static const double seam_width = 0.2;
@@ -671,23 +669,25 @@ const qmat_node qmat_node_mesh_solid = {
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
         "own. Border vertices 1e-5 diagonals apart are one. A closed component is a solid. The borders of an open one "
-        "are closed by caps if the generalised winding "
-        "number is near 0 or 1 along most of it; else it is a sheet, a surface without volume. A tooth of a border "
-        "that its cap folds back on is a sheet, too. Of triangles that "
-        "coincide with opposite sides one is kept. What faces inwards and is no cavity is turned.\n\n"
+        "are closed by caps if the generalised winding number is near 0 or 1 along most of it; else it is a sheet, a "
+        "surface without volume. A warning says where caps are more than a tenth of a component's area, such as the "
+        "lid of a box. A tooth of a border that its cap folds back on is a sheet, too. Borders that run along each "
+        "other within a fifth of epsilon, such as those of mirrored halves, are joined by triangles where that makes "
+        "a solid much thicker than the seam is wide. Of triangles that coincide with opposite sides one is kept. A "
+        "closed surface that is given with both sides is a solid. What faces inwards and is no cavity is turned.\n\n"
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
-        "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Parts that share a face "
-        "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are. Where a part "
-        "crosses itself, some of its triangles, such as those of a folded cuff, may have the outside on both sides: "
-        "they become sheets. A part that crosses only itself, in folds of at most three quarters of epsilon, stays "
-        "as it is.\n\n"
-        "A connected sheet that sticks out of solids by at most three quarters of epsilon is a flap. Examples "
-        "are what noise turns over in a scan, debris at the borders of holes, and decals. The envelope has to cover "
-        "it, but no spheres are made for it.\n\n"
+        "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Blocks that share a "
+        "face, or a part of one, become one, also where they share vertices. Cavities stay. Sheets inside a solid are "
+        "left out. Disjoint solids stay as they are. Where a part crosses itself, some of its triangles, such as "
+        "those of a folded cuff, may have the outside on both sides: they become sheets. A part that crosses only "
+        "itself, in folds of at most three quarters of epsilon, stays as it is.\n\n"
+        "A connected sheet that sticks out of solids by at most three quarters of epsilon is a flap. Examples are "
+        "what noise turns over in a scan, debris at the borders of holes, and decals. The envelope has to cover it, "
+        "but no spheres are made for it.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
-        "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says "
-        "where solids hide most others, such as a sky around a scene.",
+        "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says where "
+        "solids hide most others, such as a sky around a scene.",
     .citation = "Jacobson et al. 2013; Zhou et al. 2016, Mesh arrangements for solid geometry",
     .params_size = sizeof(mesh_solid_params),
     .params = params,

@@ -1238,6 +1238,29 @@ static void test_halves_with_a_gap_between_them_are_one_solid(void **state) {
   }
 }
 
+/* What a seam leaves open is closed by a cap; where it leaves more open than it closes, there is no seam. */
+static void test_a_seam_beside_other_holes(void **state) {
+  (void)state;
+  for (size_t left_out = 1; left_out < 9; left_out += 7) { /* triangles of each half */
+    qmat_mesh *mesh = shape_new();
+    for (int half = 0; half < 2; half++) {
+      add_half_box(mesh, 0.0015, half);
+      mesh->triangle_count -= 2; /* the side at x = 0.25 is the last; its first triangle stays if one is left out */
+      if (left_out == 1) mesh->triangle_count++;
+      if (left_out > 2) mesh->triangle_count -= 4; /* and two more sides */
+    }
+    result r = unite(mesh);
+    assert_int_equal(pipeline_count(r.report, "seam_triangles"), left_out == 1 ? 8 : 0);
+    assert_int_equal(pipeline_count(r.report, "caps"), left_out == 1 ? 2 : 0);
+    if (left_out == 1) {
+      assert_string_equal(taken_for(&r, 0), "solid with holes");
+      assert_near(volume_of(r.mesh), 0.5, 1e-12);
+      assert_near(pipeline_number(r.report, "cap_area"), (4 * 0.0015 + 2 * 0.5) / 2.25, 1e-9);
+    }
+    release(&r);
+  }
+}
+
 /* Two squares that face apart, also with a third near them; a sheet with a slit; a bowl without a rim. */
 static void test_near_sheets_and_thin_shells_are_not_joined(void **state) {
   (void)state;
@@ -1476,6 +1499,7 @@ int main(void) {
       cmocka_unit_test(test_pairs_among_many_triangles_at_one_edge),
       cmocka_unit_test(test_given_sheets_are_no_merged_pairs),
       cmocka_unit_test(test_halves_with_a_gap_between_them_are_one_solid),
+      cmocka_unit_test(test_a_seam_beside_other_holes),
       cmocka_unit_test(test_near_sheets_and_thin_shells_are_not_joined),
       cmocka_unit_test(test_a_large_opening_that_is_closed_is_a_warning),
       cmocka_unit_test(test_a_part_that_hides_all_others_is_a_warning),
