@@ -35,8 +35,8 @@ static const double least_wrap_epsilon = 0.004;
 static const double weld_tolerance = 1e-5;
 /* Borders that run along each other at most this share of epsilon apart are a seam. */
 static const double seam_width = 0.2;
-/* Caps of more than this share of the area that a component is given with are worth a warning. */
-static const double most_capped = 0.1;
+/* Caps of more than this share of a component's given area, and of that of all components, are worth a warning. */
+static const double most_capped = 0.1, most_capped_of_all = 0.05;
 /* A triangle that the union leaves out is within it if it sticks out by at most this, in diagonals: rounding. */
 static const double least_gap = 1e-9;
 /* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
@@ -228,6 +228,7 @@ static qmat_status add_cap(solidifier *s, size_t number) {
   s->cap_sides += loop->count;
   s->cap_length += loop->length;
   s->cap_area += s->cap_areas[number];
+  s->parts.parts[loop->part].cap_area += s->cap_areas[number];
   return status;
 }
 
@@ -514,25 +515,25 @@ static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
                                given - left, given);
 }
 
-/* Warns where caps are a large share of a component: it may be a container. */
+/* Warns where caps are a large share of components, and of the model: they may be containers. */
 static int warn_of_large_caps(const solidifier *s, json_t *root) {
-  size_t caps = 0, components = 0;
-  double largest = 0;
+  size_t components = 0;
+  double largest = 0, capped = 0, all = 0;
   for (size_t i = 0; i < s->parts.part_count && s->params->solid == SOLID_AUTO; i++) {
     const qmat_part *part = &s->parts.parts[i];
-    double area = 0;
-    if (part->kind != QMAT_PART_HOLES) continue;
-    for (size_t l = part->first_loop; l < part->first_loop + part->loop_count; l++) area += s->cap_areas[l];
-    if (!(area > most_capped * (part->area - part->seam_area))) continue;
+    const double given = part->area - part->seam_area;
+    all += given;
+    if (!(part->cap_area > most_capped * given)) continue;
     components++;
-    caps += part->loop_count;
-    largest = fmax(largest, area / (part->area - part->seam_area));
+    capped += part->cap_area;
+    largest = fmax(largest, part->cap_area / given);
   }
-  if (components == 0) return 0;
-  return qmat_json_add_warning(root,
-                               "%zu openings of %zu components are closed by caps of up to %.0f %% of a component's "
-                               "area; --set solid.solid=sheet keeps all surfaces open",
-                               caps, components, 100 * largest);
+  if (!(capped > most_capped_of_all * all)) return 0;
+  return qmat_json_add_warning(
+      root,
+      "the openings of %zu components are closed by caps of up to %.0f %% of a component's area; "
+      "--set solid.solid=sheet keeps all surfaces open",
+      components, 100 * largest);
 }
 
 static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_report *report) {

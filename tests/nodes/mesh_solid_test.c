@@ -1305,18 +1305,21 @@ static void test_a_large_opening_that_is_closed_is_a_warning(void **state) {
   (void)state;
   static const struct {
     const char *params;
-    double height;
+    double height, other; /* the side of a cube beside it: with 5 + 6 * 1.58^2 the cap is a twentieth */
     bool warns;
-  } cases[] = {{"", 1, true}, {"", 3, false}, {"solid=close", 1, false}, {"solid=sheet", 1, false}};
+  } cases[] = {{"", 1, 1, true},  {"", 1, 1.5, true},           {"", 1, 1.6, false},
+               {"", 3, 1, false}, {"solid=close", 1, 1, false}, {"solid=sheet", 1, 1, false}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     qmat_mesh *mesh = shape_box(1, 1, cases[i].height);
     memmove(mesh->triangles + 6, mesh->triangles + 12, 30 * sizeof *mesh->triangles); /* the second side is the lid */
     mesh->triangle_count -= 2;
+    shape_add_box(mesh, 5, 0, 0, 5 + cases[i].other, cases[i].other, cases[i].other, false);
     result r = unite_with(mesh, cases[i].params);
     const json_t *warnings = json_object_get(r.report->root, "warnings");
     assert_int_equal(json_array_size(warnings), cases[i].warns);
     if (cases[i].warns) {
       const char *text = json_string_value(json_array_get(warnings, 0));
+      assert_non_null(strstr(text, "of 1 components are"));
       assert_non_null(strstr(text, " 20 % "));
       assert_non_null(strstr(text, "--set solid.solid=sheet "));
     }
