@@ -44,8 +44,7 @@ static const double least_gap = 1e-9;
 static const double flap_reach = 0.75;
 /* If the union leaves less than this share of the triangles of solids, a part may hide the others by mistake. */
 static const double least_left = 0.2;
-/* Components and caps that the report lists. */
-enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 };
+enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 }; /* components and caps that the report lists */
 
 typedef struct triangle_list {
   size_t count, capacity;
@@ -333,7 +332,7 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   for (size_t i = 0; i < 3 * s->sheets.count; i++)
     mesh->triangles[3 * triangle_count + i] = numbers[shift + s->sheets.corners[i]];
   mesh->closed = mesh->oriented = true;
-  mesh->deviation = s->mesh->deviation + (s->weld.moved + s->sides.distance) * s->frame.diagonal;
+  mesh->deviation = s->mesh->deviation + (s->weld.moved + s->sides.distance) * s->frame.diagonal + s->united.moved;
   mesh->meters_per_unit = s->mesh->meters_per_unit;
   mesh->flap_triangle_count = s->flaps;
   if (s->sheets.count > 0) mesh->sheet_thickness = sheet_thickness(s);
@@ -409,7 +408,8 @@ static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *
   uint8_t *covered = qmat_arena_alloc(&s->context->arena, s->given_count, 1);
   if (!covered) return fail_shortage(s);
   for (size_t t = 0; t < s->given_count; t++) covered[t] = !s->united.is_cut[t];
-  qmat_status status = find_covered(s, solids, s->solids.corners, s->given_count, least_gap, covered);
+  qmat_status status = find_covered(s, solids, s->solids.corners, s->given_count,
+                                    least_gap + 2 * s->united.moved / s->frame.diagonal, covered);
   for (size_t t = 0; t < s->given_count && status == QMAT_OK; t++) {
     const uint32_t *c = s->solids.corners + 3 * t;
     if (covered[t]) continue;

@@ -311,7 +311,7 @@ class Union {
     if (!changed) return;
     merge_rounded();
     check_edges();
-    std::vector<uint32_t> triangles;
+    std::vector<uint32_t> triangles, source(arrangement_.points.size()); /* per vertex: a triangle there */
     std::vector<bool> counted(mesh_.triangle_count());
     united->is_cut = static_cast<uint8_t *>(qmat_calloc(mesh_.triangle_count(), 1));
     if (!united->is_cut) throw std::bad_alloc();
@@ -322,6 +322,7 @@ class Union {
         for (; next < pieces_.size() && pieces_[next].source == t; next++) {
           const Corners &piece = pieces_[next].corners;
           triangles.insert(triangles.end(), piece.begin(), piece.end());
+          for (const uint32_t v : piece) source[v] = t;
           if (std::is_permutation(piece.begin(), piece.end(), mesh_.corners(t))) united->is_cut[t] = false;
         }
         united->shells_united += !counted[mesh_.shell(t)];
@@ -342,7 +343,7 @@ class Union {
     united->triangles = static_cast<uint32_t *>(qmat_alloc(triangles.size(), sizeof(uint32_t)));
     if (!united->positions || !united->triangles) throw std::bad_alloc();
     for (size_t i = 0; i < used.size(); i++) {
-      const std::array<double, 3> p = rounded(used[i]);
+      const std::array<double, 3> p = mesh_.brought_back(used[i], source[used[i]], rounded(used[i]));
       std::copy(p.begin(), p.end(), united->positions + 3 * i);
     }
     for (size_t i = 0; i < triangles.size(); i++) united->triangles[i] = numbers[triangles[i]];
