@@ -531,9 +531,9 @@ static int warn_of_large_caps(const solidifier *s, json_t *root) {
   if (!(capped > most_capped_of_all * all)) return 0;
   return qmat_json_add_warning(
       root,
-      "the openings of %zu components are closed by caps of up to %.0f %% of a component's area; "
+      "the openings of %zu component%s are closed by caps of up to %.0f %% of a component's area; "
       "--set solid.solid=sheet keeps all surfaces open",
-      components, 100 * largest);
+      components, components == 1 ? "" : "s", 100 * largest);
 }
 
 static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_report *report) {

@@ -1351,7 +1351,7 @@ static void test_a_large_opening_that_is_closed_is_a_warning(void **state) {
     assert_int_equal(json_array_size(warnings), cases[i].warns);
     if (cases[i].warns) {
       const char *text = json_string_value(json_array_get(warnings, 0));
-      assert_non_null(strstr(text, "of 1 components are"));
+      assert_non_null(strstr(text, "of 1 component are"));
       assert_non_null(strstr(text, " 20 % "));
       assert_non_null(strstr(text, "--set solid.solid=sheet "));
     }
