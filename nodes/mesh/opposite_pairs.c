@@ -5,7 +5,7 @@
 
 #include "nodes/mesh/half_edges.h"
 
-/* Half-edges between two looks at whether the run is cancelled. */
+/* Half-edges between two polls for a cancel. */
 enum { POLL = 65536 };
 
 static uint32_t third_corner(const uint32_t *triangles, uint32_t half_edge) {

@@ -186,6 +186,8 @@ qmat_status qmat_square_blocks(qmat_context *context, const uint32_t *groups, qm
   if (!frames) return qmat_fail_memory(context, "the blocks");
   for (size_t first = 0, last; first < count; first = last) {
     for (last = first; last < count && keys[last] >> 32 == keys[first] >> 32;) last++;
+    const qmat_status status = qmat_progress(context, first, count, "triangles");
+    if (status != QMAT_OK) return status;
     square_group(&s, members + first, last - first, &frames[frame_of[members[first]]]);
   }
   *moved = s.moved > rounding * s.diagonal ? s.moved : 0;

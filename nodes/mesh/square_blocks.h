@@ -14,7 +14,8 @@
  * of shells that may meet, named by a triangle of theirs. Those are squared up whose facets are nearly all
  * perpendicular to three axes, which are perpendicular to each other. Sets `positions` of the shells to the copies,
  * `given` to the vertices, and `frames` to the way back; all in the context's arena. Nothing changes where all planes
- * agree already. `moved`: the largest distance between a vertex and its copy. QMAT_ERROR_MEMORY. Cost: n log n. */
+ * agree already. `moved`: the largest distance between a vertex and its copy. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One
+ * thread. Cost: n log n. */
 qmat_status qmat_square_blocks(qmat_context *context, const uint32_t *groups, qmat_shells *shells, double *moved);
 
 #endif
