@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* mesh.solid: a solid out of any triangles, and sheets of those that enclose nothing. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/disjoint_sets.h"
@@ -15,9 +14,11 @@
 #include "nodes/mesh/border_weld.h"
 #include "nodes/mesh/hole_cgal.h"
 #include "nodes/mesh/lend_joints.h"
+#include "nodes/mesh/opposite_pairs.h"
 #include "nodes/mesh/overlaps.h"
-#include "nodes/mesh/parts.h"
+#include "nodes/mesh/seams.h"
 #include "nodes/mesh/triangle_cover.h"
+#include "nodes/mesh/two_sides.h"
 #include "nodes/mesh/wrap_cgal.h"
 
 typedef enum solid_choice { SOLID_AUTO, SOLID_AS_IS, SOLID_CLOSE, SOLID_WRAP, SOLID_SHEET } solid_choice;
@@ -31,9 +32,12 @@ typedef struct mesh_solid_params {
 static const double wrap_offset = 0.25, wrap_alpha = 4;
 /* The least epsilon that a wrap is made for, in diagonals; its triangles grow with the inverse square. */
 static const double least_wrap_epsilon = 0.004;
-/* Border vertices this close are one, in diagonals: coordinates of single precision that were moved or rounded again.
- */
+/* Border vertices this close are one, in diagonals: coordinates of single precision that were rounded again. */
 static const double weld_tolerance = 1e-5;
+/* Borders that run along each other at most this share of epsilon apart are a seam. */
+static const double seam_width = 0.2;
+/* Caps of more than this share of a component's given area, and of that of all components, are worth a warning. */
+static const double most_capped = 0.1, most_capped_of_all = 0.05;
 /* A triangle that the union leaves out is within it if it sticks out by at most this, in diagonals: rounding. */
 static const double least_gap = 1e-9;
 /* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
@@ -41,8 +45,7 @@ static const double least_gap = 1e-9;
 static const double flap_reach = 0.75;
 /* If the union leaves less than this share of the triangles of solids, a part may hide the others by mistake. */
 static const double least_left = 0.2;
-/* Components and caps that the report lists. */
-enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 };
+enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 }; /* components and caps that the report lists */
 
 typedef struct triangle_list {
   size_t count, capacity;
@@ -58,15 +61,17 @@ typedef struct solidifier {
   size_t triangle_count;     /* those that are left after welding; without the given sheets' */
   const uint32_t *triangles; /* 3 * triangle_count */
   qmat_border_weld weld;
-  size_t plain_count, pair_count; /* triangles without and with an opposite one, the latter once for each pair */
+  qmat_two_sides sides;
+  size_t merged;                  /* triangles that are left out for an opposite one */
+  size_t plain_count, pair_count; /* triangles without an opposite one; the first of each pair, and given sheets */
   uint32_t *plain, *pairs;        /* their corners */
   qmat_parts parts;
   double *cap_areas; /* per loop */
   uint8_t *turned;   /* per part: it is turned inside out */
   triangle_list solids, sheets;
   double *beside_solids; /* the vertices in the frame of the surface of the solids */
-  size_t given_count;    /* of the solids' triangles; behind these are the caps */
-  size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
+  size_t given_count;    /* of the solids' triangles; behind these are seams and caps */
+  size_t seam_triangles, caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
   double cap_length, cap_area;
   qmat_united united;
   qmat_wrap wrap;
@@ -97,33 +102,13 @@ static qmat_status append(const solidifier *s, triangle_list *list, uint32_t a, 
 
 /* ---- opposite triangles ---- */
 
-static uint32_t third_corner(const uint32_t *triangles, uint32_t half_edge) {
-  return triangles[half_edge - half_edge % 3 + (half_edge + 2) % 3];
-}
-
-/* Finds pairs of triangles with the same corners and opposite sides: a card of two sides, or a wall between two solids
- * that touch. They cancel in every winding number. `classes` becomes 1 for the first of a pair and 2 for the second. */
-static qmat_status find_pairs(const solidifier *s, const uint32_t *triangles, size_t count, uint8_t *classes) {
-  qmat_half_edges e;
-  const qmat_status status = qmat_half_edges_sort(s->context, s->mesh->vertex_count, count, triangles, &e);
-  for (size_t first = 0, last; status == QMAT_OK && first < e.count; first = last) {
-    last = qmat_edge_last(&e, first);
-    const uint32_t high = qmat_half_edge_high(&e, e.order[first]);
-    for (size_t i = first; i + 1 < last; i++) {
-      const uint32_t a = e.order[i], third = third_corner(e.triangles, a);
-      if (third <= high || classes[a / 3]) continue; /* each triangle once, at the edge of its lowest corners */
-      for (size_t k = i + 1; k < last; k++) {
-        const uint32_t b = e.order[k];
-        if (classes[b / 3] || third_corner(e.triangles, b) != third ||
-            qmat_half_edge_rises(&e, a) == qmat_half_edge_rises(&e, b))
-          continue;
-        classes[a / 3] = 1;
-        classes[b / 3] = 2;
-        break;
-      }
-    }
-  }
-  return status;
+static qmat_status drop_second_sides(solidifier *s) {
+  const qmat_status status =
+      qmat_drop_second_sides(s->context, s->mesh->vertex_count, s->unit, s->triangle_count, s->triangles, &s->sides);
+  if (status != QMAT_OK || s->sides.solids == 0) return status;
+  s->triangles = s->sides.triangles;
+  s->triangle_count = s->sides.triangle_count;
+  return QMAT_OK;
 }
 
 static qmat_status split_pairs(solidifier *s) {
@@ -134,12 +119,14 @@ static qmat_status split_pairs(solidifier *s) {
   s->plain = qmat_arena_alloc(arena, 3 * s->triangle_count, sizeof *s->plain);
   s->pairs = qmat_arena_alloc(arena, 3 * (s->triangle_count + sheet_count), sizeof *s->pairs);
   if (!classes || !s->plain || !s->pairs) return fail_shortage(s);
-  const qmat_status status = find_pairs(s, s->triangles, s->triangle_count, classes);
+  const qmat_status status =
+      qmat_find_opposite_pairs(s->context, mesh->vertex_count, s->triangle_count, s->triangles, classes);
   for (size_t t = 0; status == QMAT_OK && t < s->triangle_count; t++) {
     if (classes[t] == 2) continue;
     uint32_t *to = classes[t] == 1 ? s->pairs + 3 * s->pair_count++ : s->plain + 3 * s->plain_count++;
     memcpy(to, s->triangles + 3 * t, 3 * sizeof *to);
   }
+  s->merged = s->sides.dropped + s->pair_count;
   if (sheet_count > 0)
     memcpy(s->pairs + 3 * s->pair_count, mesh->triangles + 3 * (mesh->triangle_count - sheet_count),
            3 * sheet_count * sizeof *s->pairs);
@@ -241,6 +228,7 @@ static qmat_status add_cap(solidifier *s, size_t number) {
   s->cap_sides += loop->count;
   s->cap_length += loop->length;
   s->cap_area += s->cap_areas[number];
+  s->parts.parts[loop->part].cap_area += s->cap_areas[number];
   return status;
 }
 
@@ -250,7 +238,7 @@ static qmat_status split_folds(solidifier *s, size_t given) {
   const size_t count = s->solids.count;
   uint8_t *classes = qmat_arena_calloc(&s->context->arena, count, 1);
   if (!classes) return fail_shortage(s);
-  qmat_status status = find_pairs(s, s->solids.corners, count, classes);
+  qmat_status status = qmat_find_opposite_pairs(s->context, s->mesh->vertex_count, count, s->solids.corners, classes);
   s->solids.count = 0;
   for (size_t t = 0; status == QMAT_OK && t < count; t++) {
     const uint32_t *c = s->solids.corners + 3 * t;
@@ -265,10 +253,11 @@ static qmat_status split_folds(solidifier *s, size_t given) {
   return status;
 }
 
-/* The triangles of solid parts, then their caps; those of sheets, then one of each pair. */
+/* The triangles of solid parts, then those in seams and caps; those of sheets, then one of each pair. */
 static qmat_status sort_triangles(solidifier *s) {
   const qmat_parts *parts = &s->parts;
   qmat_status status = QMAT_OK;
+  size_t given = 0;
   s->cap_areas = qmat_arena_calloc(&s->context->arena, parts->loop_count, sizeof *s->cap_areas);
   if (!s->cap_areas) return fail_shortage(s);
   for (size_t t = 0; status == QMAT_OK && t < parts->triangle_count; t++) {
@@ -276,14 +265,16 @@ static qmat_status sort_triangles(solidifier *s) {
     const bool turn = s->turned[parts->part_of[t]] == 1;
     triangle_list *list = is_sheet(&parts->parts[parts->part_of[t]]) ? &s->sheets : &s->solids;
     status = append(s, list, c[0], c[turn ? 2 : 1], c[turn ? 1 : 2]);
+    if (t < s->plain_count) given = s->solids.count;
   }
-  const size_t given = s->given_count = s->solids.count;
+  s->given_count = given;
   for (size_t i = 0; status == QMAT_OK && i < parts->loop_count; i++) {
     if (is_sheet(&parts->parts[parts->loops[i].part])) continue;
     status = add_cap(s, i);
     if (status == QMAT_OK) status = qmat_progress(s->context, i, parts->loop_count, "borders");
   }
-  if (status == QMAT_OK && s->caps > 0) status = split_folds(s, given);
+  if (status == QMAT_OK && s->solids.count > given) status = split_folds(s, given);
+  for (size_t i = 0; i < parts->part_count; i++) s->cap_area += parts->parts[i].seam_area;
   for (size_t t = 0; status == QMAT_OK && t < s->pair_count; t++)
     status = append(s, &s->sheets, s->pairs[3 * t], s->pairs[3 * t + 1], s->pairs[3 * t + 2]);
   return status;
@@ -342,7 +333,7 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   for (size_t i = 0; i < 3 * s->sheets.count; i++)
     mesh->triangles[3 * triangle_count + i] = numbers[shift + s->sheets.corners[i]];
   mesh->closed = mesh->oriented = true;
-  mesh->deviation = s->mesh->deviation + s->weld.moved * s->frame.diagonal;
+  mesh->deviation = s->mesh->deviation + (s->weld.moved + s->sides.distance) * s->frame.diagonal + s->united.moved;
   mesh->meters_per_unit = s->mesh->meters_per_unit;
   mesh->flap_triangle_count = s->flaps;
   if (s->sheets.count > 0) mesh->sheet_thickness = sheet_thickness(s);
@@ -418,7 +409,8 @@ static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *
   uint8_t *covered = qmat_arena_alloc(&s->context->arena, s->given_count, 1);
   if (!covered) return fail_shortage(s);
   for (size_t t = 0; t < s->given_count; t++) covered[t] = !s->united.is_cut[t];
-  qmat_status status = find_covered(s, solids, s->solids.corners, s->given_count, least_gap, covered);
+  qmat_status status = find_covered(s, solids, s->solids.corners, s->given_count,
+                                    least_gap + 2 * s->united.moved / s->frame.diagonal, covered);
   for (size_t t = 0; t < s->given_count && status == QMAT_OK; t++) {
     const uint32_t *c = s->solids.corners + 3 * t;
     if (covered[t]) continue;
@@ -479,11 +471,16 @@ static const char *const kind_names[QMAT_PART_KIND_COUNT] = {[QMAT_PART_CLOSED] 
 
 static json_t *describe_part(const solidifier *s, uint32_t number) {
   const qmat_part *part = &s->parts.parts[number];
-  json_t *caps = json_array(), *object = json_pack("{s:I,s:s,s:f}", "triangles", (json_int_t)part->triangle_count,
-                                                   "taken_for", kind_names[part->kind], "area", part->area);
+  json_t *caps = json_array(),
+         *object = json_pack("{s:I,s:s,s:f}", "triangles", (json_int_t)(part->triangle_count - part->seam_triangles),
+                             "taken_for", kind_names[part->kind], "area", part->area - part->seam_area);
   int bad = !caps || !object;
   if (!bad && s->turned[number] == 1) bad |= json_object_set_new(object, "turned", json_true());
   if (!bad && s->turned[number] == 2) bad |= json_object_set_new(object, "cavity", json_true());
+  if (!bad && part->seam_triangles > 0) {
+    bad |= qmat_json_set_count(object, "seam_triangles", part->seam_triangles);
+    bad |= json_object_set_new(object, "seam_area", json_real(part->seam_area));
+  }
   if (!bad && part->kind == QMAT_PART_HOLES) {
     bad |= qmat_json_set_count(object, "caps", part->loop_count);
     for (size_t i = 0; i < part->loop_count && i < MOST_CAPS_LISTED; i++) {
@@ -519,6 +516,27 @@ static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
                                given - left, given);
 }
 
+/* Warns where caps are a large share of components, and of the model: they may be containers. */
+static int warn_of_large_caps(const solidifier *s, json_t *root) {
+  size_t components = 0;
+  double largest = 0, capped = 0, all = 0;
+  for (size_t i = 0; i < s->parts.part_count && s->params->solid == SOLID_AUTO; i++) {
+    const qmat_part *part = &s->parts.parts[i];
+    const double given = part->area - part->seam_area;
+    all += given;
+    if (!(part->cap_area > most_capped * given)) continue;
+    components++;
+    capped += part->cap_area;
+    largest = fmax(largest, part->cap_area / given);
+  }
+  if (!(capped > most_capped_of_all * all)) return 0;
+  return qmat_json_add_warning(
+      root,
+      "the openings of %zu component%s are closed by caps of up to %.0f %% of a component's area; "
+      "--set solid.solid=sheet keeps all surfaces open",
+      components, components == 1 ? "" : "s", 100 * largest);
+}
+
 static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_report *report) {
   json_t *root = report->root;
   size_t kinds[QMAT_PART_KIND_COUNT] = {0}, open = 0;
@@ -533,22 +551,22 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"solids_with_holes", kinds[QMAT_PART_HOLES]},
                                     {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT]},
                                     {"sheet_triangles", s->sheets.count},
-                                    {"opposite_triangles_merged", s->pair_count - s->mesh->sheet_triangle_count},
+                                    {"opposite_triangles_merged", s->merged},
+                                    {"two_sided_solids", s->sides.solids},
                                     {"inner_triangles", s->inner_triangles},
                                     {"unbounding_triangles", s->unbounding_triangles},
                                     {"flap_triangles", s->flaps},
                                     {"parts_turned", s->turned_parts},
                                     {"triangles_turned", s->parts.turned},
+                                    {"seam_triangles", s->seam_triangles},
                                     {"caps", s->caps},
                                     {"cap_sides", s->cap_sides},
                                     {"triangles_folded", s->folded},
                                     {"parts_united", s->united.shells_united},
                                     {"triangles_cut", s->united.cut_triangles}};
   int bad = qmat_json_set_counts(root, counts, sizeof counts / sizeof *counts);
-  if (s->caps > 0) {
-    bad |= json_object_set_new(root, "cap_length", json_real(s->cap_length));
-    bad |= json_object_set_new(root, "cap_area", json_real(s->cap_area));
-  }
+  if (s->caps > 0) bad |= json_object_set_new(root, "cap_length", json_real(s->cap_length));
+  if (s->caps + s->seam_triangles > 0) bad |= json_object_set_new(root, "cap_area", json_real(s->cap_area));
   if (s->wrap.triangles) bad |= qmat_json_set_count(root, "wrap_triangles", s->wrap.triangle_count);
   if (made) {
     bad |= qmat_json_set_count(root, "vertices", made->vertex_count);
@@ -556,6 +574,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
   }
   if (s->params->solid != SOLID_AS_IS && s->params->solid != SOLID_WRAP) bad |= report_parts(s, root);
   bad |= warn_of_hidden_solids(s, root);
+  bad |= warn_of_large_caps(s, root);
   if (s->united.why_not)
     bad |= qmat_json_add_warning(root, "the solids are wrapped: those that intersect cannot be united: %s",
                                  s->united.why_not);
@@ -569,10 +588,13 @@ static qmat_status make_solid(solidifier *s) {
   if (!s->unit) return fail_shortage(s);
   qmat_frame_to_unit(&s->frame, s->mesh->positions, s->mesh->vertex_count, s->unit);
   qmat_status status = weld_seams(s);
+  if (status == QMAT_OK) status = drop_second_sides(s);
   if (status == QMAT_OK) status = split_pairs(s);
   if (status == QMAT_OK)
-    status = qmat_parts_find(s->context, s->mesh->vertex_count, s->unit, s->plain_count, s->plain, &s->parts);
+    status = qmat_parts_find_with_seams(s->context, s->mesh->vertex_count, s->unit, s->plain_count, s->plain,
+                                        s->params->solid == SOLID_SHEET ? 0 : seam_width * epsilon_of(s), &s->parts);
   if (status != QMAT_OK) return status;
+  s->seam_triangles = s->parts.triangle_count - s->plain_count;
   choose_kinds(s);
   status = turn_parts(s);
   if (status == QMAT_OK) status = sort_triangles(s);
@@ -644,28 +666,30 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 8,
+    .version = 9,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
         "own. Border vertices 1e-5 diagonals apart are one. A closed component is a solid. The borders of an open one "
-        "are closed by caps if the generalised winding "
-        "number is near 0 or 1 along most of it; else it is a sheet, a surface without volume. A tooth of a border "
-        "that its cap folds back on is a sheet, too. Of triangles that "
-        "coincide with opposite sides one is kept. What faces inwards and is no cavity is turned.\n\n"
+        "are closed by caps if the generalised winding number is near 0 or 1 along most of it; else it is a sheet, a "
+        "surface without volume. A warning says where caps are more than a tenth of a component's area, such as the "
+        "lid of a box. A tooth of a border that its cap folds back on is a sheet, too. Borders that run along each "
+        "other within a fifth of epsilon, such as those of mirrored halves, are joined by triangles where that makes "
+        "a solid much thicker than the seam is wide. Of triangles that coincide with opposite sides one is kept. A "
+        "closed surface that is given with both sides is a solid. What faces inwards and is no cavity is turned.\n\n"
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
-        "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Parts that share a face "
-        "become one, cavities stay. Sheets inside a solid are left out. Disjoint solids stay as they are. Where a part "
-        "crosses itself, some of its triangles, such as those of a folded cuff, may have the outside on both sides: "
-        "they become sheets. A part that crosses only itself, in folds of at most three quarters of epsilon, stays "
-        "as it is.\n\n"
-        "A connected sheet that sticks out of solids by at most three quarters of epsilon is a flap. Examples "
-        "are what noise turns over in a scan, debris at the borders of holes, and decals. The envelope has to cover "
-        "it, but no spheres are made for it.\n\n"
+        "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Blocks whose sides "
+        "touch become one; sides up to 1e-6 diagonals apart do. Cavities stay. Sheets inside a solid are left out. "
+        "Disjoint solids stay as they are. Where a part crosses itself, some of its triangles, such as those of a "
+        "folded cuff, may have the outside on both sides: they become sheets. A part that crosses only itself, in "
+        "folds of at most three quarters of epsilon, stays as it is.\n\n"
+        "A connected sheet that sticks out of solids by at most three quarters of epsilon is a flap. Examples are "
+        "what noise turns over in a scan, debris at the borders of holes, and decals. The envelope has to cover it, "
+        "but no spheres are made for it.\n\n"
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
-        "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says "
-        "where solids hide most others, such as a sky around a scene.",
+        "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says where "
+        "solids hide most others, such as a sky around a scene.",
     .citation = "Jacobson et al. 2013; Zhou et al. 2016, Mesh arrangements for solid geometry",
     .params_size = sizeof(mesh_solid_params),
     .params = params,

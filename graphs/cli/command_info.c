@@ -101,9 +101,9 @@ static qmat_status run_node(qmat_context *context, const char *name, double epsi
 /* Prints what mesh.solid took each component for, and what it did. Lengths are in diagonals. */
 static void print_components(const json_t *report) {
   static const char *const counts[] = {
-      "components_not_listed", "vertices_welded",      "sheet_triangles", "opposite_triangles_merged",
-      "inner_triangles",       "unbounding_triangles", "flap_triangles",  "triangles_turned",
-      "parts_united",          "triangles_cut"};
+      "components_not_listed", "vertices_welded", "sheet_triangles",      "opposite_triangles_merged",
+      "two_sided_solids",      "inner_triangles", "unbounding_triangles", "flap_triangles",
+      "triangles_turned",      "seam_triangles",  "parts_united",         "triangles_cut"};
   size_t i;
   json_t *part;
   json_array_foreach(json_object_get(report, "components"), i, part) {

@@ -310,7 +310,7 @@ class Cutter {
       if (layers != 0)
         add_piece(group[0], c, layers);
       else if (f->info().count > 0)
-        out_.cancelled.push_back(group[0]);
+        out_.cancelled.push_back({group[0], c, 0});
     }
     std::sort(out_.pieces.begin() + static_cast<ptrdiff_t>(first_piece), out_.pieces.end(),
               [](const Piece &a, const Piece &b) { return a.corners < b.corners; });

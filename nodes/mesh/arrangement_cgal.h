@@ -16,7 +16,7 @@ namespace qmat {
 struct Piece {
   uint32_t source; /* the first triangle that it is cut from */
   Corners corners; /* vertices of the arrangement, the smallest first */
-  int layers;      /* above 0: the triangles there that face this way minus those that face the other way */
+  int layers;      /* the triangles there that face this way minus those that face the other way; not below 0 */
 };
 
 /* Whether two triangles have more in common than the corners and edges that they share by index. */
@@ -49,9 +49,9 @@ void for_each_box_pair(const UnionMesh &mesh, const std::vector<uint32_t> &trian
  * mesh, then those on cuts. */
 struct Arrangement {
   std::vector<Piece> pieces;
-  std::vector<uint32_t> cancelled; /* triangles in whose plane other triangles cancel */
-  size_t cut_count = 0;            /* triangles that are cut, or overlap others */
-  std::vector<Point> points;       /* per vertex; those of mesh vertices are set only where triangles meet */
+  std::vector<Piece> cancelled; /* faces where the triangles of a plane cancel: of 0 layers */
+  size_t cut_count = 0;         /* triangles that are cut, or overlap others */
+  std::vector<Point> points;    /* per vertex; those of mesh vertices are set only where triangles meet */
 };
 
 /* Cuts `triangles` (sorted) where the sorted `pairs` of them meet, in exact arithmetic. Throws UnionRefused. */

@@ -6,7 +6,9 @@
 
 #include "core/disjoint_sets.h"
 #include "core/geometry/half_edges.h"
+#include "core/geometry/vector.h"
 #include "nodes/mesh/crossings_cgal.h"
+#include "nodes/mesh/square_blocks.h"
 
 typedef struct box {
   double low[3], high[3];
@@ -24,7 +26,7 @@ typedef struct unison {
   size_t vertex_count, triangle_count;
   const double *positions;
   const uint32_t *triangles;
-  uint32_t *shells, *patches; /* disjoint sets of triangles */
+  uint32_t *shells, *patches, *groups; /* disjoint sets of triangles; groups: shells that may meet */
 } unison;
 
 static qmat_status fail_shortage(qmat_context *context) {
@@ -35,12 +37,16 @@ static qmat_status fail_shortage(qmat_context *context) {
 static qmat_status find_shells(unison *u) {
   u->shells = qmat_sets_new(u->context, u->triangle_count);
   u->patches = qmat_sets_new(u->context, u->triangle_count);
-  if (!u->shells || !u->patches) return fail_shortage(u->context);
+  u->groups = qmat_sets_new(u->context, u->triangle_count);
+  if (!u->shells || !u->patches || !u->groups) return fail_shortage(u->context);
   qmat_half_edges e;
   const qmat_status status = qmat_half_edges_sort(u->context, u->vertex_count, u->triangle_count, u->triangles, &e);
   for (size_t first = 0, last; status == QMAT_OK && first < e.count; first = last) {
     last = qmat_edge_last(&e, first);
-    for (size_t i = first + 1; i < last; i++) qmat_sets_join(u->shells, e.order[first] / 3, e.order[i] / 3);
+    for (size_t i = first + 1; i < last; i++) {
+      qmat_sets_join(u->shells, e.order[first] / 3, e.order[i] / 3);
+      qmat_sets_join(u->groups, e.order[first] / 3, e.order[i] / 3);
+    }
     if (last - first == 2) qmat_sets_join(u->patches, e.order[first] / 3, e.order[first + 1] / 3);
   }
   return status;
@@ -74,14 +80,29 @@ static bool intersect_boxes(const box *a, const box *b, box *common) {
   return meet;
 }
 
+/* Boxes of blocks whose planes rounding has moved apart have to meet. */
+static void widen_boxes(patch *patches, size_t count) {
+  box all = no_box;
+  for (size_t i = 0; i < count; i++) {
+    grow_box(&all, patches[i].bounds.low);
+    grow_box(&all, patches[i].bounds.high);
+  }
+  for (size_t i = 0; i < count; i++)
+    for (int k = 0; k < 3; k++) {
+      patches[i].bounds.low[k] -= QMAT_SAME_PLANE * qmat_point_distance(all.low, all.high);
+      patches[i].bounds.high[k] += QMAT_SAME_PLANE * qmat_point_distance(all.low, all.high);
+    }
+}
+
 static int compare_patches(const void *left, const void *right) {
   const patch *a = left, *b = right;
   const int order = (a->bounds.low[0] > b->bounds.low[0]) - (a->bounds.low[0] < b->bounds.low[0]);
   return order != 0 ? order : (a->leader > b->leader) - (a->leader < b->leader);
 }
 
-/* Finds the patches of shells whose boxes intersect. `reaches` (per triangle) becomes 1 if the triangle's box
- * meets such an intersection, and `is_near` (zeroed, per shell by its leader) becomes 1 for their shells. */
+/* Finds the patches of shells whose boxes intersect, or are apart by rounding only. `reaches` (per triangle) becomes 1
+ * if the triangle's box meets such an intersection, and `is_near` (zeroed, per shell by its leader) becomes 1 for their
+ * shells. */
 static qmat_status find_near(unison *u, uint8_t *reaches, uint8_t *is_near) {
   const unison *mesh = u;
   qmat_arena *arena = &u->context->arena;
@@ -98,6 +119,7 @@ static qmat_status find_near(unison *u, uint8_t *reaches, uint8_t *is_near) {
     for (size_t k = 0; k < 3; k++)
       grow_box(&s->bounds, mesh->positions + 3 * (size_t)mesh->triangles[3 * (size_t)t + k]);
   }
+  widen_boxes(patches, count);
   qsort(patches, count, sizeof *patches, compare_patches);
   for (size_t i = 0; i < count; i++) {
     const qmat_status status = qmat_progress(u->context, i, count, "parts");
@@ -110,6 +132,7 @@ static qmat_status find_near(unison *u, uint8_t *reaches, uint8_t *is_near) {
       grow_box(&patches[i].reach, common.high);
       grow_box(&patches[j].reach, common.low);
       grow_box(&patches[j].reach, common.high);
+      qmat_sets_join(u->groups, patches[i].leader, patches[j].leader);
       is_near[qmat_set_leader(u->shells, patches[i].leader)] = is_near[qmat_set_leader(u->shells, patches[j].leader)] =
           1;
     }
@@ -127,7 +150,7 @@ qmat_status qmat_unite_overlaps(qmat_context *context, size_t vertex_count, cons
                                 qmat_united *united) {
   *united = (qmat_united){.changed = false};
   if (triangle_count == 0) return QMAT_OK;
-  unison u = {context, vertex_count, triangle_count, positions, triangles, NULL, NULL};
+  unison u = {context, vertex_count, triangle_count, positions, triangles, NULL, NULL, NULL};
   qmat_arena *arena = &context->arena;
   uint8_t *reaches = qmat_arena_alloc(arena, triangle_count, 1), *is_near = qmat_arena_calloc(arena, triangle_count, 1),
           *crosses = qmat_arena_calloc(arena, triangle_count, 1);
@@ -157,7 +180,14 @@ qmat_status qmat_unite_overlaps(qmat_context *context, size_t vertex_count, cons
     any = any || is_near[shells[t]];
   }
   if (!any) return QMAT_OK;
-  for (size_t t = 0; t < triangle_count; t++)
-    if (!is_near[shells[t]]) shells[t] = QMAT_NO_SHELL;
-  return qmat_unite_shells(context, &input, united);
+  for (uint32_t t = 0; t < triangle_count; t++) u.groups[t] = qmat_set_leader(u.groups, t);
+  for (uint32_t t = 0; t < triangle_count; t++)
+    if (!is_near[shells[t]]) shells[t] = u.groups[t] = QMAT_NO_SHELL;
+  qmat_shells squared = input;
+  double moved;
+  status = qmat_square_blocks(context, u.groups, &squared, &moved);
+  if (status == QMAT_OK) status = qmat_unite_shells(context, &squared, united);
+  if (status == QMAT_OK && united->changed) united->moved = moved;
+  if (status == QMAT_OK && united->why_not && squared.given) status = qmat_unite_shells(context, &input, united);
+  return status;
 }

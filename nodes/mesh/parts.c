@@ -227,14 +227,15 @@ static qmat_status find_parts(division *d) {
 
 /* ---- borders ---- */
 
-/* The part whose triangles at an edge come first in part order after part `after`; UINT32_MAX: none. */
-static uint32_t next_part_at(const division *d, size_t first, size_t last, uint32_t after, bool any) {
-  uint32_t next = UINT32_MAX;
-  for (size_t i = first; i < last; i++) {
-    const uint32_t part = d->parts->part_of[d->edges.order[i] / 3];
-    if ((any || part > after) && part < next) next = part;
-  }
-  return next;
+/* A triangle at an edge, and its part. */
+typedef struct edge_part {
+  uint32_t part, half_edge;
+} edge_part;
+
+static int compare_edge_parts(const void *left, const void *right) {
+  const edge_part *a = left, *b = right;
+  if (a->part != b->part) return a->part < b->part ? -1 : 1;
+  return (a->half_edge > b->half_edge) - (a->half_edge < b->half_edge);
 }
 
 static int compare_border_edges(const void *left, const void *right) {
@@ -244,9 +245,35 @@ static int compare_border_edges(const void *left, const void *right) {
   return (a->to > b->to) - (a->to < b->to);
 }
 
-/* The sides that caps need to have: at each edge of a part, what rises more often than it falls has to fall. */
+/* Adds the sides that caps need to have at one edge, where `here` are its triangles by part: what rises more often than
+ * it falls has to fall. The first pass only counts them. */
+static void find_border_at(division *d, const edge_part *here, size_t count, bool counts_only) {
+  const qmat_half_edges *e = &d->edges;
+  const uint32_t low = qmat_half_edge_low(e, here[0].half_edge), high = qmat_half_edge_high(e, here[0].half_edge);
+  for (size_t first = 0, last; first < count; first = last) {
+    const uint32_t part = here[first].part;
+    int64_t rising = 0;
+    uint32_t third = 0;
+    for (last = first; last < count && here[last].part == part; last++) {
+      const uint32_t h = here[last].half_edge;
+      rising += qmat_half_edge_rises(e, h) ? 1 : -1;
+      third = e->triangles[h - h % 3 + (h + 2) % 3];
+    }
+    for (; rising != 0; rising += rising > 0 ? -1 : 1, d->border_count++)
+      if (!counts_only)
+        d->border[d->border_count] = (border_edge){part, rising > 0 ? high : low, rising > 0 ? low : high, third};
+  }
+}
+
 static qmat_status find_border(division *d) {
   const qmat_half_edges *e = &d->edges;
+  size_t most = 1;
+  for (size_t first = 0, last; first < e->count; first = last) {
+    last = qmat_edge_last(e, first);
+    if (last - first > most) most = last - first;
+  }
+  edge_part *here = qmat_arena_alloc(&d->context->arena, most, sizeof *here);
+  if (!here) return fail_shortage(d);
   for (int pass = 0; pass < 2; pass++) {
     d->border_count = 0;
     for (size_t first = 0, last; first < e->count; first = last) {
@@ -254,21 +281,10 @@ static qmat_status find_border(division *d) {
       if (last - first == 2 && d->parts->part_of[e->order[first] / 3] == d->parts->part_of[e->order[first + 1] / 3] &&
           qmat_half_edge_rises(e, e->order[first]) != qmat_half_edge_rises(e, e->order[first + 1]))
         continue;
-      const uint32_t low = qmat_half_edge_low(e, e->order[first]), high = qmat_half_edge_high(e, e->order[first]);
-      for (uint32_t part = next_part_at(d, first, last, 0, true); part != UINT32_MAX;
-           part = next_part_at(d, first, last, part, false)) {
-        int64_t rising = 0;
-        uint32_t third = 0;
-        for (size_t i = first; i < last; i++) {
-          const uint32_t h = e->order[i];
-          if (d->parts->part_of[h / 3] != part) continue;
-          rising += qmat_half_edge_rises(e, h) ? 1 : -1;
-          third = e->triangles[h - h % 3 + (h + 2) % 3];
-        }
-        for (; rising != 0; rising += rising > 0 ? -1 : 1, d->border_count++)
-          if (pass == 1)
-            d->border[d->border_count] = (border_edge){part, rising > 0 ? high : low, rising > 0 ? low : high, third};
-      }
+      for (size_t i = first; i < last; i++)
+        here[i - first] = (edge_part){d->parts->part_of[e->order[i] / 3], e->order[i]};
+      if (last - first > 1) qsort(here, last - first, sizeof *here, compare_edge_parts);
+      find_border_at(d, here, last - first, pass == 0);
     }
     if (pass == 0) {
       d->border = qmat_arena_alloc(&d->context->arena, d->border_count + 1, sizeof *d->border);

@@ -24,8 +24,11 @@ typedef struct qmat_part {
   qmat_part_kind kind;
   size_t triangle_count;
   size_t first_loop, loop_count;
-  double area, volume; /* the volume with holes closed by cones */
-  double filled;       /* share of the area at which the winding number is near 0 or 1 */
+  double area, volume;   /* the volume with holes closed by cones */
+  double filled;         /* share of the area at which the winding number is near 0 or 1 */
+  size_t seam_triangles; /* of triangle_count: those that qmat_parts_find_with_seams adds */
+  double seam_area;      /* theirs, of the area */
+  double cap_area;       /* 0; for the caller that closes the borders */
 } qmat_part;
 
 /* A mesh divided into parts: triangles connected across edges. A piece that meets others at edges of more than two

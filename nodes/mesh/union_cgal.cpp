@@ -60,7 +60,7 @@ class Union {
       if (is_active(t)) triangles.push_back(t);
     arrangement_ = arrange(mesh_, triangles, find_pairs(triangles));
     changed_.resize(mesh_.triangle_count());
-    for (const uint32_t t : arrangement_.cancelled) changed_[cluster_of(t)] = true;
+    for (const Piece &face : arrangement_.cancelled) changed_[cluster_of(face.source)] = true;
     find_regions();
     choose_pieces();
     copy_out(united);
@@ -175,12 +175,33 @@ class Union {
     return std::max({distance(c[0], c[1]), distance(c[1], c[2]), distance(c[2], c[0])}) > 2 * mesh_.longest_fold();
   }
 
+  /* The winding number in front of a piece. */
+  int winding_before(const Piece &piece) {
+    Point corner[3];
+    for (size_t k = 0; k < 3; k++) {
+      const uint32_t id = piece.corners[k];
+      corner[k] = id < mesh_.vertex_count() ? mesh_.exact(id) : arrangement_.points[id];
+    }
+    return winding_numbers_.before(corner, piece.layers, QMAT_NO_SHELL);
+  }
+
+  /* Sets `has_wall` for the clusters in which triangles cancel with the inside on both sides: blocks that touch. */
+  void find_walls(std::vector<bool> &has_wall) {
+    for (size_t i = 0; i < arrangement_.cancelled.size(); i++) {
+      if (i % 64 == 0) mesh_.progress(i, arrangement_.cancelled.size(), "pieces");
+      const Piece &face = arrangement_.cancelled[i];
+      const uint32_t cluster = cluster_of(face.source);
+      if (!has_wall[cluster]) has_wall[cluster] = winding_before(face) > 0;
+    }
+  }
+
   /* A shell that meets only itself stays where all vertices that it hides are near the border of their region, and no
-   * hidden piece is large: its union would leave crumbs. */
+   * hidden piece is large: its union would leave crumbs. A shell with walls inside does not stay. */
   void leave_short_folds(const std::vector<int8_t> &kept) {
     std::vector<size_t> shells(mesh_.triangle_count());
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++) shells[cluster_of_any(t)] += mesh_.shell(t) == t;
     std::vector<bool> is_kept(arrangement_.points.size()), has_long_fold(mesh_.triangle_count());
+    find_walls(has_long_fold);
     std::vector<Pair> hidden; /* region, vertex */
     for (size_t i = 0; i < pieces_.size(); i++) {
       const uint32_t cluster = cluster_of(pieces_[i].source);
@@ -217,12 +238,7 @@ class Union {
       int8_t &keeps = kept[region_of_[i]];
       const Piece &piece = pieces_[i];
       if (keeps < 0) {
-        Point corner[3];
-        for (size_t k = 0; k < 3; k++) {
-          const uint32_t id = piece.corners[k];
-          corner[k] = id < mesh_.vertex_count() ? mesh_.exact(id) : arrangement_.points[id];
-        }
-        const int before = winding_numbers_.before(corner, piece.layers, QMAT_NO_SHELL);
+        const int before = winding_before(piece);
         keeps = before <= 0 && before + piece.layers > 0;
       }
       if (!keeps || piece.layers != 1) changed_[cluster_of(piece.source)] = true;
@@ -295,7 +311,7 @@ class Union {
     if (!changed) return;
     merge_rounded();
     check_edges();
-    std::vector<uint32_t> triangles;
+    std::vector<uint32_t> triangles, source(arrangement_.points.size()); /* per vertex: a triangle there */
     std::vector<bool> counted(mesh_.triangle_count());
     united->is_cut = static_cast<uint8_t *>(qmat_calloc(mesh_.triangle_count(), 1));
     if (!united->is_cut) throw std::bad_alloc();
@@ -306,6 +322,7 @@ class Union {
         for (; next < pieces_.size() && pieces_[next].source == t; next++) {
           const Corners &piece = pieces_[next].corners;
           triangles.insert(triangles.end(), piece.begin(), piece.end());
+          for (const uint32_t v : piece) source[v] = t;
           if (std::is_permutation(piece.begin(), piece.end(), mesh_.corners(t))) united->is_cut[t] = false;
         }
         united->shells_united += !counted[mesh_.shell(t)];
@@ -326,7 +343,7 @@ class Union {
     united->triangles = static_cast<uint32_t *>(qmat_alloc(triangles.size(), sizeof(uint32_t)));
     if (!united->positions || !united->triangles) throw std::bad_alloc();
     for (size_t i = 0; i < used.size(); i++) {
-      const std::array<double, 3> p = rounded(used[i]);
+      const std::array<double, 3> p = mesh_.brought_back(used[i], source[used[i]], rounded(used[i]));
       std::copy(p.begin(), p.end(), united->positions + 3 * i);
     }
     for (size_t i = 0; i < triangles.size(); i++) united->triangles[i] = numbers[triangles[i]];

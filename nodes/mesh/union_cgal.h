@@ -19,6 +19,7 @@ typedef struct qmat_united {
   uint8_t *is_cut;      /* per triangle of the mesh: whether it is cut or left out */
   size_t shells_united; /* cut or left out */
   size_t cut_triangles; /* of the mesh */
+  double moved;         /* how far blocks are moved to touch: the result may be as far from the mesh */
 } qmat_united;
 
 /* The boundary of the union: the points with a winding number above 0. Triangles are cut along their intersections in

@@ -75,6 +75,22 @@ class UnionMesh {
     return shells_.longest_fold;
   }
 
+  /* Where the result has a vertex that the union has at `p`, on a piece of a triangle. */
+  std::array<double, 3> brought_back(uint32_t vertex, uint32_t triangle, const std::array<double, 3> &p) const {
+    if (!shells_.given) return p;
+    if (vertex < vertex_count()) {
+      const double *given = shells_.given + 3 * static_cast<size_t>(vertex);
+      return {given[0], given[1], given[2]};
+    }
+    const qmat_block_frame &frame = shells_.frames[shells_.frame_of[triangle]];
+    if (!frame.is_turned) return p;
+    std::array<double, 3> back;
+    for (size_t k = 0; k < 3; k++)
+      back[k] =
+          frame.centre[k] + (p[0] - frame.shift) * frame.axes[0][k] + p[1] * frame.axes[1][k] + p[2] * frame.axes[2][k];
+    return back;
+  }
+
   /* Whether the corners are collinear; false without a shell. */
   bool is_flat(uint32_t triangle) const {
     return is_flat_[triangle];

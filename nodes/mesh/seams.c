@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "nodes/mesh/seams.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/geometry/triangle.h"
+#include "core/geometry/half_edges.h"
+
+/* The mean thickness of a solid is at least so many times the width of its seams. */
+static const double least_thickness = 4;
+/* A direction that no plane of a model is likely to be perpendicular to. */
+static const double direction[3] = {0.8017, 0.5233, 0.2887};
+/* Divisions with ever fewer seams. */
+enum { MOST_ROUNDS = 3 };
+
+/* A border edge, as its triangle runs along it. */
+typedef struct border_edge {
+  double along; /* of its middle */
+  uint32_t from, to, triangle;
+} border_edge;
+
+/* A triangle in a seam. */
+typedef struct seam_triangle {
+  uint32_t corners[3];
+  double width;  /* the larger distance between the ends of the two edges */
+  double length; /* of the border that it closes */
+} seam_triangle;
+
+/* What a part with seams is made of. */
+typedef struct joined_part {
+  bool has_sheets;
+  double width, length;
+} joined_part;
+
+typedef struct seam_finder {
+  qmat_context *context;
+  size_t vertex_count, triangle_count;
+  const double *positions;
+  const uint32_t *triangles;
+  double tolerance;
+  border_edge *border;
+  size_t border_count;
+  size_t *nearest; /* per border edge; SIZE_MAX: none */
+  seam_triangle *seams;
+  size_t seam_count;
+} seam_finder;
+
+static qmat_status fail_shortage(const seam_finder *s) {
+  return qmat_fail_memory(s->context, "the seams");
+}
+
+static const double *position(const seam_finder *s, uint32_t vertex) {
+  return s->positions + 3 * (size_t)vertex;
+}
+
+static double distance(const seam_finder *s, uint32_t a, uint32_t b) {
+  return qmat_point_distance(position(s, a), position(s, b));
+}
+
+/* ---- edges that run along each other ---- */
+
+static int compare_border_edges(const void *left, const void *right) {
+  const border_edge *a = left, *b = right;
+  if (a->along != b->along) return a->along < b->along ? -1 : 1;
+  return (a->triangle > b->triangle) - (a->triangle < b->triangle);
+}
+
+static qmat_status find_border(seam_finder *s) {
+  qmat_half_edges e;
+  const qmat_status status = qmat_half_edges_sort(s->context, s->vertex_count, s->triangle_count, s->triangles, &e);
+  if (status != QMAT_OK) return status;
+  for (int pass = 0; pass < 2; pass++) {
+    s->border_count = 0;
+    for (size_t first = 0, last; first < e.count; first = last) {
+      last = qmat_edge_last(&e, first);
+      if (last - first > 1) continue;
+      const uint32_t h = e.order[first], from = qmat_half_edge_start(&e, h), to = qmat_half_edge_end(&e, h);
+      if (pass == 1)
+        s->border[s->border_count] = (border_edge){
+            (qmat_dot(direction, position(s, from)) + qmat_dot(direction, position(s, to))) / 2, from, to, h / 3};
+      s->border_count++;
+    }
+    if (pass == 0 && !(s->border = qmat_arena_alloc(&s->context->arena, s->border_count, sizeof *s->border)))
+      return fail_shortage(s);
+  }
+  qsort(s->border, s->border_count, sizeof *s->border, compare_border_edges);
+  return QMAT_OK;
+}
+
+/* How far apart two edges are that run in opposite directions; infinite for those of one triangle. */
+static double width_between(const seam_finder *s, const border_edge *a, const border_edge *b) {
+  if (a->triangle == b->triangle || a->from == b->from || a->to == b->to) return INFINITY;
+  return fmax(distance(s, a->from, b->to), distance(s, a->to, b->from));
+}
+
+static qmat_status find_nearest(seam_finder *s) {
+  double *widths = qmat_arena_alloc(&s->context->arena, s->border_count, sizeof *widths);
+  s->nearest = qmat_arena_alloc(&s->context->arena, s->border_count, sizeof *s->nearest);
+  if (!widths || !s->nearest) return fail_shortage(s);
+  for (size_t i = 0; i < s->border_count; i++) {
+    widths[i] = INFINITY;
+    s->nearest[i] = SIZE_MAX;
+  }
+  for (size_t i = 0; i < s->border_count; i++) {
+    for (size_t k = i + 1; k < s->border_count && s->border[k].along - s->border[i].along <= s->tolerance; k++) {
+      const double width = width_between(s, &s->border[i], &s->border[k]);
+      if (!(width <= s->tolerance)) continue;
+      if (width < widths[i]) widths[i] = width, s->nearest[i] = k;
+      if (width < widths[k]) widths[k] = width, s->nearest[k] = i;
+    }
+    const qmat_status status = qmat_progress(s->context, i, s->border_count, "border edges");
+    if (status != QMAT_OK) return status;
+  }
+  return QMAT_OK;
+}
+
+static void add_seam_triangle(seam_finder *s, uint32_t a, uint32_t b, uint32_t c, double width, double length) {
+  if (a == b || b == c || c == a) return; /* the edges have an end in common */
+  s->seams[s->seam_count++] = (seam_triangle){{a, b, c}, width, length};
+}
+
+/* Two triangles between each two edges that are nearest to each other. */
+static qmat_status find_seams(seam_finder *s) {
+  qmat_status status = find_border(s);
+  if (status == QMAT_OK) status = find_nearest(s);
+  if (status != QMAT_OK) return status;
+  s->seams = qmat_arena_alloc(&s->context->arena, s->border_count, sizeof *s->seams);
+  if (!s->seams) return fail_shortage(s);
+  for (size_t i = 0; i < s->border_count; i++) {
+    const size_t k = s->nearest[i];
+    if (k == SIZE_MAX || k < i || s->nearest[k] != i) continue;
+    const border_edge *a = &s->border[i], *b = &s->border[k];
+    const double width = width_between(s, a, b);
+    add_seam_triangle(s, a->to, a->from, b->to, width, distance(s, a->from, a->to));
+    add_seam_triangle(s, a->to, b->to, b->from, width, distance(s, b->from, b->to));
+  }
+  return QMAT_OK;
+}
+
+/* ---- which of them stay ---- */
+
+static double area_of(const seam_finder *s, const uint32_t *corners) {
+  double normal[3];
+  qmat_triangle_normal(position(s, corners[0]), position(s, corners[1]), position(s, corners[2]), normal);
+  return sqrt(qmat_dot(normal, normal)) / 2;
+}
+
+static qmat_status divide_with_seams(const seam_finder *s, qmat_parts *parts) {
+  const size_t count = s->triangle_count + s->seam_count;
+  uint32_t *triangles = qmat_arena_alloc(&s->context->arena, 3 * count, sizeof *triangles);
+  if (!triangles) return fail_shortage(s);
+  memcpy(triangles, s->triangles, 3 * s->triangle_count * sizeof *triangles);
+  for (size_t i = 0; i < s->seam_count; i++)
+    memcpy(triangles + 3 * (s->triangle_count + i), s->seams[i].corners, 3 * sizeof *triangles);
+  const qmat_status status = qmat_parts_find(s->context, s->vertex_count, s->positions, count, triangles, parts);
+  for (size_t i = 0; status == QMAT_OK && i < s->seam_count; i++) {
+    qmat_part *part = &parts->parts[parts->part_of[s->triangle_count + i]];
+    part->seam_triangles++;
+    part->seam_area += area_of(s, s->seams[i].corners);
+  }
+  return status;
+}
+
+static bool stays(const qmat_parts *parts, const qmat_part *part, const joined_part *joined) {
+  double open = 0;
+  for (size_t l = part->first_loop; l < part->first_loop + part->loop_count; l++) open += parts->loops[l].length;
+  const bool is_solid = part->kind == QMAT_PART_CLOSED || part->kind == QMAT_PART_HOLES;
+  return is_solid && (joined->has_sheets || part->loop_count == 0) && open <= joined->length &&
+         2 * fabs(part->volume) >= least_thickness * joined->width * part->area;
+}
+
+/* Takes out the seams of parts that they do not improve. `apart`: the parts without seams. */
+static qmat_status drop_seams(seam_finder *s, const qmat_parts *apart, const qmat_parts *parts, size_t *dropped) {
+  joined_part *joined = qmat_arena_calloc(&s->context->arena, parts->part_count, sizeof *joined);
+  if (!joined) return fail_shortage(s);
+  for (size_t t = 0; t < s->triangle_count; t++)
+    if (apart->parts[apart->part_of[t]].kind == QMAT_PART_OPEN) joined[parts->part_of[t]].has_sheets = true;
+  for (size_t i = 0; i < s->seam_count; i++) {
+    joined_part *j = &joined[parts->part_of[s->triangle_count + i]];
+    j->width = fmax(j->width, s->seams[i].width);
+    j->length += s->seams[i].length;
+  }
+  size_t kept = 0;
+  for (size_t i = 0; i < s->seam_count; i++) {
+    const uint32_t part = parts->part_of[s->triangle_count + i];
+    if (stays(parts, &parts->parts[part], &joined[part])) s->seams[kept++] = s->seams[i];
+  }
+  *dropped = s->seam_count - kept;
+  s->seam_count = kept;
+  return QMAT_OK;
+}
+
+qmat_status qmat_parts_find_with_seams(qmat_context *context, size_t vertex_count, const double *positions,
+                                       size_t triangle_count, const uint32_t *triangles, double tolerance,
+                                       qmat_parts *parts) {
+  seam_finder s = {.context = context,
+                   .vertex_count = vertex_count,
+                   .triangle_count = triangle_count,
+                   .positions = positions,
+                   .triangles = triangles,
+                   .tolerance = tolerance};
+  qmat_status status = qmat_parts_find(context, vertex_count, positions, triangle_count, triangles, parts);
+  if (status != QMAT_OK || parts->loop_count == 0 || !(tolerance > 0)) return status;
+  const qmat_parts apart = *parts;
+  status = find_seams(&s);
+  for (int round = 0; status == QMAT_OK && round < MOST_ROUNDS && s.seam_count > 0; round++) {
+    size_t dropped = 0;
+    status = divide_with_seams(&s, parts);
+    if (status == QMAT_OK) status = drop_seams(&s, &apart, parts, &dropped);
+    if (status != QMAT_OK || dropped == 0) return status;
+  }
+  *parts = apart;
+  return status;
+}
