@@ -15,7 +15,8 @@ typedef struct qmat_streams {
 /* Whether a path names a standard stream: "-", or "-.ma" for one with a format. */
 bool qmat_is_stream(const char *path);
 
-/* Copies the standard input to a file; a second call gives the same file. QMAT_ERROR_IO. */
+/* Copies the standard input to a file; a second call gives the same file. QMAT_ERROR_IO; QMAT_CANCELLED
+ * by a signal. */
 qmat_status qmat_streams_read(qmat_context *context, qmat_streams *streams, const char **path);
 
 /* The file that goes to the standard output, of that name in the temporary folder. QMAT_ERROR_USAGE: there is one
@@ -24,6 +25,9 @@ qmat_status qmat_streams_write(qmat_context *context, qmat_streams *streams, con
 
 /* Copies that file to the standard output. */
 qmat_status qmat_streams_flush(qmat_context *context, const qmat_streams *streams);
+
+/* Names the stream in an error about its file, whose path nobody knows. */
+void qmat_streams_name(const qmat_streams *streams, qmat_error *error);
 
 /* Removes the folder, and names the stream in an error about its file. */
 void qmat_streams_close(qmat_context *context, qmat_streams *streams);
