@@ -16,6 +16,7 @@
 #include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_compress.h"
 #include "io/gltf/gltf_embed.h"
+#include "io/gltf/gltf_hull_names.h"
 #include "io/gltf/gltf_place.h"
 #include "io/gltf/gltf_rig.h"
 #include "io/gltf/gltf_skin.h"
@@ -182,19 +183,19 @@ static json_t *make_extras(const qmat_medial *medial, const medial_text *text, c
 typedef struct document {
   json_t *root;
   bool binary;
-  qmat_gltf_asset asset;           /* the asset that was read, or empty */
-  uint8_t *embedded;               /* the chunk with embedded files, then also asset.chunk; owned; may be NULL */
-  qmat_gltf_compressed compressed; /* compressed meshes, or empty; its chunk, if any, is then also asset.chunk */
-  qmat_writer data;                /* bytes to add to the buffers */
-  bool in_chunk;                   /* `data` goes into the GLB's chunk, not into a buffer with a URI */
-  size_t data_start;               /* offset of `data` after the asset's own chunk; 0: in another buffer */
-  json_int_t buffer;               /* number of the buffer that holds `data` */
-  json_int_t material;             /* of the skins; -1: not created yet */
-  const qmat_scene *places;        /* of a new asset: where the meshes are; NULL: one mesh, where it is */
-  size_t nodes_given;              /* of the asset that was read */
-  json_t *converter;               /* of a new asset: the node that turns units and axes; NULL: none yet */
-  qmat_gltf_rig rig;               /* of the places */
-  json_int_t *skins;               /* per place: its skin in the asset, -1: none; NULL: no place has one */
+  qmat_gltf_asset asset;            /* the asset that was read, or empty */
+  uint8_t *embedded;                /* the chunk with embedded files, then also asset.chunk; owned; may be NULL */
+  qmat_gltf_compressed compressed;  /* compressed meshes, or empty; its chunk, if any, is then also asset.chunk */
+  qmat_writer data;                 /* bytes to add to the buffers */
+  bool in_chunk;                    /* `data` goes into the GLB's chunk, not into a buffer with a URI */
+  size_t data_start;                /* offset of `data` after the asset's own chunk; 0: in another buffer */
+  json_int_t buffer;                /* number of the buffer that holds `data` */
+  json_int_t material;              /* of the skins; -1: not created yet */
+  const qmat_scene *places;         /* of a new asset: where the meshes are; NULL: one mesh, where it is */
+  size_t nodes_given, meshes_given; /* of the asset that was read */
+  json_t *converter;                /* of a new asset: the node that turns units and axes; NULL: none yet */
+  qmat_gltf_rig rig;                /* of the places */
+  json_int_t *skins;                /* per place: its skin in the asset, -1: none; NULL: no place has one */
 } document;
 
 /* The bytes as a data URI; NULL when out of memory. */
@@ -406,6 +407,7 @@ static qmat_status open_document(qmat_context *context, const qmat_scene *scene,
     asset->chunk_size = size;
   }
   document->nodes_given = json_array_size(json_object_get(document->root, "nodes"));
+  document->meshes_given = json_array_size(json_object_get(document->root, "meshes"));
   const json_t *buffers = json_object_get(document->root, "buffers");
   const bool has_chunk =
       asset->chunk && json_array_size(buffers) > 0 && !json_object_get(json_array_get(buffers, 0), "uri");
@@ -514,6 +516,10 @@ static qmat_status add_colliders(qmat_context *context, const qmat_scene *scene,
   static const double none[3] = {0, 0, 0};
   const json_t *nodes = json_object_get(document->root, "nodes");
   const size_t count = json_array_size(nodes);
+  /* Unreal finds the hulls of a mesh by its name. */
+  const json_t *meshes = json_object_get(document->root, "meshes");
+  const char *own = json_string_value(json_object_get(json_array_get(meshes, (size_t)mesh), "name"));
+  if (mesh >= 0 && own && *own) name = own;
   qmat_gltf_colliders added = {.colliders = addition->colliders,
                                .forms = addition->collider_forms,
                                .name = name ? name : "model",
@@ -660,6 +666,8 @@ static qmat_status write_document(qmat_context *context, const qmat_scene *scene
   if (status == QMAT_OK && places) status = add_rig(context, &document, &additions[0].options);
   for (size_t i = 0; i < count && status == QMAT_OK; i++)
     if (additions[i].medial) status = add_medial(context, scene, i, &additions[i], &document);
+  if (status == QMAT_OK && !qmat_gltf_number_hulls(document.root, document.meshes_given, document.nodes_given))
+    status = qmat_fail_memory(context, "a glTF file");
   if (status == QMAT_OK && !place_data(&document)) status = qmat_fail_memory(context, "a glTF file");
   if (status == QMAT_OK) status = make_file(context, scene, &document, file);
   close_document(&document);
