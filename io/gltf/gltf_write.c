@@ -9,170 +9,21 @@
 #include "core/node.h"
 #include "io/base64.h"
 #include "io/bytes.h"
-#include "io/draco.h"
-#include "io/flat_medial.h"
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_bind.h"
 #include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_compress.h"
 #include "io/gltf/gltf_embed.h"
 #include "io/gltf/gltf_hull_names.h"
+#include "io/gltf/gltf_medial_text.h"
 #include "io/gltf/gltf_place.h"
 #include "io/gltf/gltf_rig.h"
 #include "io/gltf/gltf_skin.h"
 
 #define DATA_URI "data:application/octet-stream;base64,"
 
-/* ---- the medial mesh as text ---- */
-
-typedef struct medial_text {
-  char *base64;
-  int position_bits, radius_bits;
-  const double *origin; /* the spheres are relative to it */
-  double loss;          /* measured error of the encoding, model units */
-  char *flat;           /* base64 of the plain form; NULL: none */
-  bool flat_floats;
-  double flat_loss; /* as `loss` */
-  bool has_joints;  /* the plain form has the joints of the spheres */
-} medial_text;
-
-/* Encodes the medial mesh, decodes it again, and measures the loss. */
-static qmat_status encode_and_measure(qmat_context *context, const qmat_medial *medial, medial_text *text,
-                                      uint8_t **bytes, size_t *size) {
-  qmat_medial *decoded = NULL;
-  qmat_status status =
-      qmat_draco_encode_medial(context, medial, text->origin, text->position_bits, text->radius_bits, bytes, size);
-  if (status != QMAT_OK) return status;
-  status = qmat_draco_decode_medial(context, *bytes, *size, text->origin, &decoded);
-  if (status == QMAT_OK &&
-      (decoded->sphere_count != medial->sphere_count || decoded->edge_count != medial->edge_count ||
-       decoded->triangle_count != medial->triangle_count)) {
-    status = qmat_fail(context, QMAT_ERROR_INTERNAL, "the medial mesh that Draco decodes differs from the encoded one");
-  }
-  if (status == QMAT_OK) text->loss = qmat_medial_move(medial, decoded);
-  if (decoded) qmat_value_release(&decoded->base);
-  return status;
-}
-
-/* Encodes the plain form, decodes it again, and measures the loss. */
-static qmat_status encode_flat(qmat_context *context, const qmat_medial *medial, const double *errors,
-                               medial_text *text) {
-  uint8_t *bytes = NULL;
-  size_t size = 0;
-  qmat_medial *decoded = NULL;
-  uint16_t *joints = text->has_joints ? qmat_alloc(4 * medial->sphere_count, sizeof *joints) : NULL;
-  if (text->has_joints && !joints) return qmat_fail_memory(context, "the medial mesh as text");
-  for (size_t i = 0; joints && i < 4 * medial->sphere_count; i++) joints[i] = (uint16_t)medial->joints[i];
-  const qmat_sphere_data data = {.errors = errors, .joints = joints, .weights = medial->weights};
-  qmat_status status = qmat_flat_encode(context, medial, &data, text->origin, text->flat_floats, &bytes, &size);
-  if (status == QMAT_OK) status = qmat_flat_decode(context, bytes, size, text->origin, &decoded);
-  if (status == QMAT_OK) {
-    qmat_free(text->flat);
-    text->flat_loss = qmat_medial_move(medial, decoded);
-    text->flat = qmat_base64_encode(bytes, size);
-    if (!text->flat) status = qmat_fail_memory(context, "the medial mesh as text");
-  }
-  if (decoded) qmat_value_release(&decoded->base);
-  qmat_free(bytes);
-  qmat_free(joints);
-  return status;
-}
-
-static qmat_status make_flat_text(qmat_context *context, const qmat_medial *medial, const qmat_gltf_options *options,
-                                  medial_text *text) {
-  if (options->flat == QMAT_FLAT_NONE) return QMAT_OK;
-  text->flat_floats = options->flat == QMAT_FLAT_FLOAT;
-  qmat_status status = encode_flat(context, medial, options->sphere_errors, text);
-  if (status == QMAT_OK && options->flat == QMAT_FLAT_AUTO && text->flat_loss > options->quantisation) {
-    text->flat_floats = true;
-    status = encode_flat(context, medial, options->sphere_errors, text);
-  }
-  return status;
-}
-
-/* `has_skin`: a node with the mesh has one, which joints refer to. */
-static qmat_status make_medial_text(qmat_context *context, const qmat_medial *medial, const double *origin,
-                                    bool has_skin, const qmat_gltf_options *options, medial_text *text) {
-  double position_range, radius_range, allowed = options->quantisation;
-  bool choose_position = options->position_bits == 0, choose_radius = options->radius_bits == 0;
-  qmat_draco_medial_ranges(medial, &position_range, &radius_range);
-  *text = (medial_text){.position_bits = options->position_bits,
-                        .radius_bits = options->radius_bits,
-                        .origin = origin,
-                        .has_joints = has_skin && medial->skinned_count > 0};
-  if (choose_position) text->position_bits = qmat_draco_bits_for(3, position_range, allowed / 2);
-  if (choose_radius) text->radius_bits = qmat_draco_bits_for(1, radius_range, allowed / 2);
-
-  uint8_t *bytes = NULL;
-  size_t size = 0;
-  qmat_status status = encode_and_measure(context, medial, text, &bytes, &size);
-  /* The bound ignores single-precision rounding; a few more bits may compensate for it. */
-  for (int tries = 0; tries < 3 && status == QMAT_OK && text->loss > allowed; tries++) {
-    bool more_position = choose_position && text->position_bits < 30,
-         more_radius = choose_radius && text->radius_bits < 30;
-    if (!more_position && !more_radius) break;
-    text->position_bits += more_position;
-    text->radius_bits += more_radius;
-    qmat_free(bytes);
-    status = encode_and_measure(context, medial, text, &bytes, &size);
-  }
-  if (status == QMAT_OK) {
-    text->base64 = qmat_base64_encode(bytes, size);
-    if (!text->base64) status = qmat_fail_memory(context, "the medial mesh as text");
-  }
-  qmat_free(bytes);
-  if (status == QMAT_OK) status = make_flat_text(context, medial, options, text);
-  return status;
-}
-
-static bool set_count(json_t *object, const char *key, size_t count) {
-  return qmat_gltf_set(object, key, json_integer((json_int_t)count));
-}
-
 static bool is_zero(const double *origin) {
   return origin[0] == 0 && origin[1] == 0 && origin[2] == 0;
-}
-
-/* The extras that describe a medial mesh; NULL when out of memory. */
-static json_t *make_extras(const qmat_medial *medial, const medial_text *text, const qmat_stated_errors *stated) {
-  json_t *extras = json_object();
-  bool done = extras && qmat_gltf_set(extras, "qmat_version", json_string(QMAT_VERSION)) &&
-              qmat_gltf_set(extras, "qmat_data_format", json_string("draco")) &&
-              qmat_gltf_set(extras, "qmat_data", json_string(text->base64)) &&
-              set_count(extras, "qmat_vertices", medial->sphere_count) &&
-              set_count(extras, "qmat_edges", medial->edge_count) &&
-              set_count(extras, "qmat_triangles", medial->triangle_count);
-  const struct {
-    const char *key;
-    double value;
-  } errors[] = {
-      {"qmat_epsilon", stated->epsilon}, {"qmat_error_out", stated->error_out}, {"qmat_error_in", stated->error_in}};
-  bool any = false;
-  for (size_t i = 0; i < sizeof errors / sizeof *errors && done; i++) {
-    if (!isfinite(errors[i].value)) continue;
-    done = qmat_gltf_set(extras, errors[i].key, json_real(errors[i].value));
-    any = true;
-  }
-  if (any) done = done && qmat_gltf_set(extras, "qmat_error_unit", json_string("diagonal"));
-  if (stated->certified != QMAT_CERTIFICATE_UNKNOWN)
-    done = done && qmat_gltf_set(extras, "qmat_certified", json_boolean(stated->certified == QMAT_CERTIFICATE_YES));
-  done = done && qmat_gltf_set(extras, "qmat_quantisation", json_real(text->loss)) &&
-         qmat_gltf_set(extras, "qmat_quantisation_unit", json_string("model")) &&
-         set_count(extras, "qmat_position_bits", (size_t)text->position_bits) &&
-         set_count(extras, "qmat_radius_bits", (size_t)text->radius_bits) &&
-         qmat_gltf_set(extras, "qmat_frame", json_string("node"));
-  if (text->flat) {
-    done = done && qmat_gltf_set(extras, "qmat_flat", json_string(text->flat)) &&
-           qmat_gltf_set(extras, "qmat_flat_format", json_string(text->flat_floats ? "f32" : "u16")) &&
-           qmat_gltf_set(extras, "qmat_flat_quantisation", json_real(text->flat_loss));
-    if (text->has_joints) done = done && qmat_gltf_set(extras, "qmat_skinned", json_true());
-  }
-  static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
-  for (int k = 0; k < 3 && done && !is_zero(text->origin); k++)
-    done = qmat_gltf_set(extras, axes[k], json_real(text->origin[k]));
-  if (done) return extras;
-  json_decref(extras);
-  return NULL;
 }
 
 /* ---- JSON ---- */
@@ -548,7 +399,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   /* JSON must be UTF-8, but a file's name may be anything. */
   const char *name = options.name && options.name[0] && qmat_is_utf8(options.name) ? options.name : NULL;
   const qmat_mesh *mesh = addition->skin && addition->skin->triangle_count > 0 ? addition->skin : NULL;
-  medial_text text = {0};
+  qmat_gltf_medial_text text = {0};
   qmat_gltf_skin data = {0};
   json_int_t skin = -1;
   const size_t nodes_before = json_array_size(json_object_get(document->root, "nodes"));
@@ -559,14 +410,14 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   const bool has_rig = mesh && document->skins && addition->vertices.joints;
   if (has_rig) status = add_skins(context, document, index);
   if (status == QMAT_OK)
-    status = make_medial_text(context, addition->medial, origin, of_mesh || has_rig, &options, &text);
+    status = qmat_gltf_medial_text_init(context, addition->medial, origin, of_mesh || has_rig, &options, &text);
   const qmat_stated_errors stated = qmat_errors_after_move(&options.errors, fmax(text.loss, text.flat_loss));
   const double skin_moved = options.compress_skin && !has_rig ? fmax(options.quantisation, DBL_MIN) : 0;
   const size_t offset = document->data_start + document->data.size;
   if (status == QMAT_OK && mesh)
     status = qmat_gltf_skin_put(context, mesh, has_rig ? in_place : origin, &addition->vertices, skin_moved, &data,
                                 &document->data);
-  json_t *extras = status == QMAT_OK ? make_extras(addition->medial, &text, &stated) : NULL;
+  json_t *extras = status == QMAT_OK ? qmat_gltf_medial_extras(addition->medial, &text, &stated) : NULL;
   bool done = extras && (!mesh || qmat_gltf_skin_add(document->root, &data, document->buffer, offset,
                                                      &document->material, name, scene != NULL, &skin));
   if (done && of_mesh) {
@@ -581,8 +432,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   if (status == QMAT_OK && !done) status = qmat_fail_memory(context, "a glTF file");
   if (options.stated) *options.stated = stated;
   json_decref(extras);
-  qmat_free(text.base64);
-  qmat_free(text.flat);
+  qmat_gltf_medial_text_uninit(&text);
   return status;
 }
 
