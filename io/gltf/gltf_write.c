@@ -93,10 +93,13 @@ static void remove_extras(json_t *own) {
   }
 }
 
+static const double in_place[3] = {0, 0, 0}; /* where joints take the points of a mesh from */
+
 /* Adds a medial mesh and its skin to every node that references the mesh. The skin is always on a child. The medial
- * mesh is on a child if its origin is not the node's, or if the node's extras are not an object. */
+ * mesh is on a child if its origin is not the node's, or if the node's extras are not an object. A skin with joints
+ * moves by the skin of the node. */
 static bool add_to_carriers(document *document, json_int_t mesh, const json_t *extras, const double *origin,
-                            json_int_t skin) {
+                            json_int_t skin, bool has_joints) {
   json_t *nodes = json_object_get(document->root, "nodes");
   const size_t count = json_array_size(nodes);
   bool done = true;
@@ -110,7 +113,10 @@ static bool add_to_carriers(document *document, json_int_t mesh, const json_t *e
     } else {
       done = set_extras(node, extras);
     }
-    if (done && skin >= 0) done = add_child(document->root, node, json_pack("{s:I}", "mesh", skin), origin, "skin");
+    if (!done || skin < 0) continue;
+    json_t *child = json_pack("{s:I}", "mesh", skin), *moved_by = json_object_get(node, "skin");
+    if (child && has_joints && moved_by) done = qmat_gltf_set(child, "skin", json_incref(moved_by));
+    done = add_child(document->root, node, child, has_joints ? in_place : origin, "skin") && done;
   }
   return done;
 }
@@ -406,9 +412,8 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   double origin[3];
   qmat_status status = QMAT_OK;
   qmat_storage_origin(addition->medial, mesh, options.quantisation, origin);
-  static const double in_place[3] = {0, 0, 0}; /* where joints take the points of a mesh from */
-  const bool has_rig = mesh && document->skins && addition->vertices.joints;
-  if (has_rig) status = add_skins(context, document, index);
+  const bool has_rig = mesh && (document->skins || of_mesh) && addition->vertices.joints;
+  if (has_rig && document->skins) status = add_skins(context, document, index);
   if (status == QMAT_OK)
     status = qmat_gltf_medial_text_init(context, addition->medial, origin, of_mesh || has_rig, &options, &text);
   const qmat_stated_errors stated = qmat_errors_after_move(&options.errors, fmax(text.loss, text.flat_loss));
@@ -421,7 +426,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   bool done = extras && (!mesh || qmat_gltf_skin_add(document->root, &data, document->buffer, offset,
                                                      &document->material, name, scene != NULL, &skin));
   if (done && of_mesh) {
-    done = add_to_carriers(document, scene->meshes[index], extras, origin, skin);
+    done = add_to_carriers(document, scene->meshes[index], extras, origin, skin, has_rig);
   } else if (done) {
     done = document->places ? add_places(document, index, extras, origin, skin, &options)
                             : add_node(document, extras, origin, skin, name, &options, !scene);

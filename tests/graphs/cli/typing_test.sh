@@ -164,6 +164,9 @@ holds "what a link names is laid out" cmp before.yaml laid_out.yaml
 # Colliders.
 expect 0 "box.xml (" "$qmat" mat box.off -o box.xml --colliders --kind spheres --epsilon 10% --set samples.spacing=10%
 holds "MuJoCo's colliders" grep -q '<geom .*type="sphere"' box.xml
+expect 1 "require: not certified" "$qmat" mat box.off -o bad.glb --colliders --kind spheres --require certified \
+  --epsilon 10% --set samples.spacing=10% --set errors.epsilon=0.0001%
+holds "what is not certified is not written" test ! -e bad.glb
 expect 0 "" "$qmat" run colliders --set model=box.off --set kind=spheres --set epsilon=10% --set samples.spacing=10% \
   -o run.xml
 holds "as the graph makes them" cmp run.xml box.xml
