@@ -13,6 +13,7 @@
 #include "io/gltf/gltf_bind.h"
 #include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_compress.h"
+#include "io/gltf/gltf_earlier.h"
 #include "io/gltf/gltf_embed.h"
 #include "io/gltf/gltf_hull_names.h"
 #include "io/gltf/gltf_medial_text.h"
@@ -241,8 +242,21 @@ static qmat_status add_skins(qmat_context *context, document *document, size_t m
 
 /* ---- the document ---- */
 
-static qmat_status open_document(qmat_context *context, const qmat_scene *scene, const qmat_gltf_options *options,
+/* Takes what an earlier run added for the meshes that get medial meshes out of the asset. */
+static qmat_status drop_earlier(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
+                                document *document) {
+  const size_t count = json_array_size(json_object_get(document->root, "meshes"));
+  bool *is_replaced = qmat_calloc(count + 1, sizeof *is_replaced);
+  for (size_t i = 0; is_replaced && i < scene->mesh_count; i++)
+    if (scene->meshes[i] < count) is_replaced[scene->meshes[i]] = additions[i].medial != NULL;
+  const bool done = is_replaced && qmat_gltf_drop_earlier(document->root, is_replaced, &document->asset.chunk_size);
+  qmat_free(is_replaced);
+  return done ? QMAT_OK : qmat_fail_memory(context, "a glTF file");
+}
+
+static qmat_status open_document(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                                  document *document) {
+  const qmat_gltf_options *options = &additions[0].options;
   document->binary = document->in_chunk = options->binary;
   document->material = -1;
   if (!scene) {
@@ -263,6 +277,7 @@ static qmat_status open_document(qmat_context *context, const qmat_scene *scene,
     asset->chunk = document->embedded;
     asset->chunk_size = size;
   }
+  if (status == QMAT_OK && scene->mesh_count > 0) status = drop_earlier(context, scene, additions, document);
   document->nodes_given = json_array_size(json_object_get(document->root, "nodes"));
   document->meshes_given = json_array_size(json_object_get(document->root, "meshes"));
   const json_t *buffers = json_object_get(document->root, "buffers");
@@ -516,7 +531,7 @@ static qmat_status write_document(qmat_context *context, const qmat_scene *scene
                                   qmat_file **file) {
   document document = {.places = places};
   *file = NULL;
-  qmat_status status = open_document(context, scene, &additions[0].options, &document);
+  qmat_status status = open_document(context, scene, additions, &document);
   if (status == QMAT_OK && draco_meshes) status = compress_meshes(context, scene, additions, count, &document, report);
   if (status == QMAT_OK && places) status = add_rig(context, &document, &additions[0].options);
   for (size_t i = 0; i < count && status == QMAT_OK; i++)
