@@ -4,33 +4,8 @@
 
 #include <stdbool.h>
 
+#include "io/gltf/gltf_medial_text.h"
 #include "io/gltf/gltf_skin.h"
-#include "io/stored_medial.h"
-
-/* How the plain form of a medial mesh (qmat_flat) stores coordinates and radii. */
-typedef enum qmat_flat_form {
-  QMAT_FLAT_AUTO,  /* 16 bits where they suffice for `quantisation`, else single precision */
-  QMAT_FLAT_SHORT, /* 16 bits */
-  QMAT_FLAT_FLOAT, /* single precision */
-  QMAT_FLAT_NONE   /* there is no plain form */
-} qmat_flat_form;
-
-/* How to write a medial mesh, and its known errors. */
-typedef struct qmat_gltf_options {
-  bool binary;                 /* write a .glb; else a .gltf with its data as base64 */
-  bool embed;                  /* for a .glb: embed the files that a scene refers to */
-  bool compress_skin;          /* require KHR_draco_mesh_compression: smaller, but some engines reject it */
-  int position_bits;           /* 1 to 30; 0: chosen from `quantisation` */
-  int radius_bits;             /* the same */
-  qmat_flat_form flat;         /* of qmat_flat */
-  double quantisation;         /* allowed error of storage, model units; used if bits are 0, and by QMAT_FLAT_AUTO */
-  const char *name;            /* of the node and the mesh, UTF-8; NULL or "": none */
-  double meters_per_unit;      /* of the medial mesh, for a new asset; 0: unknown, taken for 1 */
-  bool is_z_up;                /* the same; else y is up */
-  const double *sphere_errors; /* as in qmat_sphere_data; NULL: not known */
-  qmat_stated_errors errors;   /* of the given medial mesh */
-  qmat_stated_errors *stated;  /* gets the errors that the file states; may be NULL */
-} qmat_gltf_options;
 
 /* Makes a glTF 2.0 file of a medial mesh: one scene with one node. glTF measures in metres and y is up; a medial mesh
  * in other units or with z up keeps its coordinates, and its node gets a parent that scales and turns it. The node has
