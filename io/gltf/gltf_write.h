@@ -64,13 +64,15 @@ qmat_status qmat_gltf_write_places(qmat_context *context, const qmat_scene *scen
  * preserved: the JSON gains keys and members at the end of arrays, and no byte of a buffer changes. `additions` has one
  * element per mesh of the scene (scene->mesh_count), in that mesh's space. If mesh_count is 0, it has one element for
  * the whole scene, in world space. Every node that references the mesh gets the extras above; they replace those of an
- * earlier run. If the node's extras are not an object, a new child gets them. The skin becomes a new child of the node.
- * Children are translated if the data have another origin. A medial mesh of the whole scene gets a new node with its
- * extras and skin. Skin data follow the GLB's binary chunk, or are in a new buffer. `binary` and `embed` must be the
- * same in all options. Files that the asset refers to and that are not embedded become further parts of `*file`
- * (qmat_gltf_side_parts). With `draco_meshes`, qmat_gltf_compress compresses the asset's own triangles within the
- * smallest `quantisation`; the errors in the extras include that movement. `report` (an object, may be NULL) then gains
- * draco_primitives and, if something is unchanged, warnings. Otherwise as qmat_gltf_write. */
+ * earlier run, all of whose additions to these nodes are taken out first (qmat_gltf_drop_earlier). If the node's extras
+ * are not an object, a new child gets them. The skin becomes a new child of the node, with the node's own skin where
+ * its vertices have joints. Hulls of colliders have the name of the asset's mesh. Children are translated if the data
+ * have another origin. A medial mesh of the whole scene gets a new node with its extras and skin. Skin data follow the
+ * GLB's binary chunk, or are in a new buffer. `binary` and `embed` must be the same in all options. Files that the
+ * asset refers to and that are not embedded become further parts of `*file` (qmat_gltf_side_parts). With
+ * `draco_meshes`, qmat_gltf_compress compresses the asset's own triangles within the smallest `quantisation`; the
+ * errors in the extras include that movement. `report` (an object, may be NULL) then gains draco_primitives and, if
+ * something is unchanged, warnings. Otherwise as qmat_gltf_write. */
 qmat_status qmat_gltf_enrich(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                              size_t count, bool draco_meshes, json_t *report, qmat_file **file);
 
