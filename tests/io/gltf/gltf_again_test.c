@@ -21,10 +21,10 @@
 static const char boxes[] =
     "{'asset':{'version':'2.0'},'scenes':[{'nodes':[0,1,2]}],'extensionsUsed':['KHR_implicit_shapes'],"
     "'extensions':{'KHR_implicit_shapes':{'shapes':[{'type':'sphere','sphere':{'radius':1}}]}},"
-    "'nodes':[{'mesh':0,'name':'a'},{'mesh':1,'name':'b'},{'mesh':2,'name':'UCX_Box_07'}],"
+    "'nodes':[{'mesh':0,'name':'a'},{'mesh':1,'name':'b'},{'mesh':2,'name':'UCX_Box_01'}],"
     "'meshes':[{'name':'Box','primitives':[{'attributes':{'POSITION':0},'indices':1}]},"
     "{'name':'Box','primitives':[{'attributes':{'POSITION':0},'indices':1}]},"
-    "{'name':'UCX_Box_07','primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
+    "{'name':'UCX_Box_01','primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
     "'accessors':[{'bufferView':0,'componentType':5126,'count':8,'type':'VEC3','min':[0,0,0],'max':[1,1,1]},"
     "{'bufferView':1,'componentType':5123,'count':36,'type':'SCALAR'}],"
     "'bufferViews':[{'buffer':0,'byteLength':96},{'buffer':0,'byteOffset':96,'byteLength':72}],"
@@ -130,6 +130,7 @@ static void test_what_an_earlier_run_added_is_replaced_or_goes(void **state) {
     const bool has_skin = i >= 5;
     qmat_file *plain = run_on(glb.bytes, glb.size, 0, false), *first = run_on(glb.bytes, glb.size, chosen, has_skin);
     assert_true(first->parts[0].size > plain->parts[0].size);
+    assert_non_null(memmem(plain->parts[0].bytes, plain->parts[0].size, "\"radius\":1", 10)); /* the asset's shape */
     qmat_file *second = run_on(first->parts[0].bytes, first->parts[0].size, chosen, has_skin);
     assert_same_file(second, first);
     qmat_file *without = run_on(second->parts[0].bytes, second->parts[0].size, 0, false);
@@ -155,16 +156,16 @@ static size_t shown_as(const json_t *root, const char *name, const char *mesh) {
   return count;
 }
 
-/* The asset has UCX_Box_07, so that the hulls of the first box are 08 and 09, and those of the second 10 and 11. */
+/* The asset has UCX_Box_01, so that the hulls of the first box are 02 and 03, and those of the second 04 and 05. */
 static void test_hulls_of_meshes_of_one_name_have_numbers_of_their_own(void **state) {
   (void)state;
-  static const char *const numbers[] = {"08", "09", "10", "11"};
+  static const char *const numbers[] = {"02", "03", "04", "05"};
   qmat_context context = {0};
   qmat_gltf_asset asset;
   qmat_writer glb = make_boxes();
   qmat_file *file = run_on(glb.bytes, glb.size, QMAT_GLTF_UNREAL | QMAT_GLTF_GODOT, false);
   assert_int_equal(qmat_gltf_asset_init(&context, file->parts[0].bytes, file->parts[0].size, "boxes", &asset), QMAT_OK);
-  assert_int_equal(shown_as(asset.root, "UCX_Box_07", "UCX_Box_07"), 1);
+  assert_int_equal(shown_as(asset.root, "UCX_Box_01", "UCX_Box_01"), 1);
   for (size_t i = 0; i < 4; i++) {
     char unreal[32], godot[32];
     snprintf(unreal, sizeof unreal, "UCX_Box_%s", numbers[i]);
