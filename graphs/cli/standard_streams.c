@@ -91,6 +91,15 @@ void qmat_streams_name(const qmat_streams *streams, qmat_error *error) {
     snprintf(error->file, sizeof error->file, "standard input");
 }
 
+void qmat_streams_name_in(const qmat_streams *streams, json_t *report) {
+  const char *key, *text = json_string_value(report);
+  json_t *value;
+  size_t i;
+  if (text && streams->input[0] && strcmp(text, streams->input) == 0) json_string_set(report, "-");
+  json_array_foreach(report, i, value) qmat_streams_name_in(streams, value);
+  json_object_foreach(report, key, value) qmat_streams_name_in(streams, value);
+}
+
 void qmat_streams_close(qmat_context *context, qmat_streams *streams) {
   if (!streams->folder[0]) return;
   qmat_streams_name(streams, &context->error);

@@ -2,6 +2,8 @@
 #ifndef QMAT_GRAPHS_CLI_STANDARD_STREAMS_H
 #define QMAT_GRAPHS_CLI_STANDARD_STREAMS_H
 
+#include <jansson.h>
+
 #include "core/context.h"
 
 /* "-" as the name of a file: the standard input or output, through a temporary folder. A file that is read several
@@ -28,6 +30,9 @@ qmat_status qmat_streams_flush(qmat_context *context, const qmat_streams *stream
 
 /* Names the stream in an error about its file, whose path nobody knows. */
 void qmat_streams_name(const qmat_streams *streams, qmat_error *error);
+
+/* The same for each text of a report that is the path of that file: "-". */
+void qmat_streams_name_in(const qmat_streams *streams, json_t *report);
 
 /* Removes the folder, and names the stream in an error about its file. */
 void qmat_streams_close(qmat_context *context, qmat_streams *streams);

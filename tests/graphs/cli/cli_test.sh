@@ -296,7 +296,7 @@ holds "exit code 3 after a signal, not $code" test $code -eq 3
 holds "the cancelled node is named" grep -q 'cancelled' err.txt
 holds "no file after a signal" test ! -e torus.glb
 
-# So does qmat info, where a solid takes long to make: 60 boxes in one another's way.
+# So does qmat info, where a solid takes long to make: 300 boxes in one another's way.
 awk 'BEGIN {
   n = 300
   printf "OFF\n%d %d 0\n", 8 * n, 6 * n

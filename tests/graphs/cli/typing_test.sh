@@ -54,6 +54,11 @@ for signal in HUP INT QUIT TERM; do
   holds "SIG$signal leaves nothing behind" test -z "$(ls temporary)" -a ! -e waiting.ma
 done
 
+"$qmat" mat - -o out.ma --report failed.json <broken.off >out.txt 2>err.txt
+"$qmat" mat - -o out.ma --report run.json $coarse -q <box.off >out.txt 2>err.txt
+holds "reports of a failure and of a run name the standard input" \
+  sh -c 'grep -q "\"file\": \"standard input\"" failed.json && grep -q "\"-\"" run.json && ! grep -q "temporary/" failed.json run.json'
+
 # Names cannot move the cursor.
 cp box.off "$(printf 'b\033[2Jx.off')"
 "$qmat" info "$(printf 'b\033[2Jx.off')" >out.txt 2>err.txt
