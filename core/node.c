@@ -292,7 +292,7 @@ static qmat_status resolve_lengths(qmat_context *context, const qmat_node *node,
     *value = -*value / diagonal;
     if (float_in_range(param, *value)) continue;
     char length[48], given[160];
-    qmat_format_length(diagonal, length);
+    qmat_format_length(diagonal, diagonal, length);
     snprintf(given, sizeof given, "%s of a diagonal of %s", text, length);
     return fail_range(context, param, given);
   }

@@ -190,29 +190,30 @@ size_t qmat_control_length(const char *text) {
  */
 static const double least_written = 0.001;
 
-/* The least number of two digits that is not below `value`; 0 where that is not above 0. */
-static double round_up(double value) {
+/* The least number of two digits that is not below `value` and `least`; 0 where `value` is not above 0. */
+static double round_up(double value, double least) {
   if (!(value > 0)) return 0;
-  value = fmax(value, least_written);
+  value = fmax(value, least);
   const double digits = floor(1 - floor(log10(value))), scale = pow(10, digits > 0 ? digits : 0);
   /* The factor below 1 absorbs rounding errors: 0.98 must not be rounded up to 0.99. */
-  return ceil(value * scale * (1 - 1e-12)) / scale;
+  return isfinite(scale) ? ceil(value * scale * (1 - 1e-12)) / scale : value;
 }
 
 void qmat_format_bound(double fraction, char *text) {
   char number[40];
-  qmat_format_number(round_up(fraction * 100), number, sizeof number);
+  qmat_format_number(round_up(fraction * 100, least_written), number, sizeof number);
   snprintf(text, 48, "%s %%", number);
 }
 
-void qmat_format_length(double meters, char *text) {
+void qmat_format_length(double meters, double size, char *text) {
   static const struct {
     const char *unit;
     double scale, below;
   } units[] = {{"mm", 1000, 0.1}, {"cm", 100, 1}, {"m", 1, 0}};
   size_t i = 0;
-  double value = round_up(meters * units[i].scale);
-  while (i < 2 && value >= units[i].below * units[i].scale) value = round_up(meters * units[++i].scale);
+  const double least = fmin(least_written, size * 1000 * least_written / 100);
+  double value = round_up(meters * units[i].scale, least);
+  while (i < 2 && value >= units[i].below * units[i].scale) value = round_up(meters * units[++i].scale, least);
   char number[40];
   qmat_format_number(value, number, sizeof number);
   snprintf(text, 48, "%s %s", number, units[i].unit);

@@ -48,9 +48,9 @@ void qmat_format_bytes(uint64_t bytes, char *text);
  * `text` holds at least 48 bytes. */
 void qmat_format_bound(double fraction, char *text);
 
-/* A length as "4.9 mm", "12 cm" or "3.1 m", with two digits, rounded up, 0.001 mm at least unless it is 0. `text` holds
- * at least 48 bytes. */
-void qmat_format_length(double meters, char *text);
+/* A length as "4.9 mm", "12 cm" or "3.1 m", with two digits, rounded up. Unless it is 0 it is 0.001 mm at least, or
+ * 0.001 % of the model's size (metres; INFINITY: not known) where that is less. `text` holds at least 48 bytes. */
+void qmat_format_length(double meters, double size, char *text);
 
 /* The name nearest to `text` by edit distance among `count` names, or NULL when none is near. */
 const char *qmat_nearest_name(const char *text, const char *const *names, size_t count);

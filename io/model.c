@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/model.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 #include <strings.h>
@@ -13,6 +14,8 @@
 #include "io/scanner.h"
 #include "io/stretch.h"
 #include "io/usd/usd_model.h"
+
+#define LONGEST_DIAGONAL (DBL_MAX / 8)
 
 static const struct {
   const char *title; /* the usual name */
@@ -185,13 +188,41 @@ static void set_units(qmat_scene *scene, qmat_format format, const json_t *repor
   scene->is_z_up = up && up[0] == 'Z';
 }
 
+/* Lengths of a few diagonals must be numbers too, as nodes measure with them. */
+static qmat_status check_extent(qmat_context *context, const char *path, const qmat_mesh *mesh) {
+  double square = 0;
+  for (size_t axis = 0; axis < 3; axis++) {
+    double low = INFINITY, high = -INFINITY;
+    for (size_t v = 0; v < mesh->vertex_count; v++) {
+      low = fmin(low, mesh->positions[3 * v + axis]);
+      high = fmax(high, mesh->positions[3 * v + axis]);
+    }
+    const double share = high / LONGEST_DIAGONAL - low / LONGEST_DIAGONAL;
+    square += share * share;
+  }
+  if (square <= 1) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_GEOMETRY, "its bounding box is too large to be measured");
+  return qmat_fail_at(context, path, 0, 0);
+}
+
+/* qmat_soup_to_mesh for a mesh that can be measured. */
+static qmat_status make_surface(qmat_context *context, const qmat_soup *soup, const char *path,
+                                const qmat_read_options *options, qmat_mesh **mesh, json_t *report) {
+  qmat_status status = qmat_soup_to_mesh(context, soup, path, options, mesh, report);
+  if (status == QMAT_OK) status = check_extent(context, path, *mesh);
+  if (status == QMAT_OK || !*mesh) return status;
+  qmat_value_release(&(*mesh)->base);
+  *mesh = NULL;
+  return status;
+}
+
 static qmat_status read_whole(qmat_context *context, qmat_format format, const char *path, const qmat_bytes *bytes,
                               const qmat_read_options *options, qmat_value **mesh, json_t *report) {
   qmat_soup soup = {0};
   qmat_mesh *made = NULL;
   qmat_status status = read_surface(context, format, path, bytes, &soup, report);
   if (format == QMAT_FORMAT_USD) soup.meters_per_unit = unit_of_usd(report);
-  if (status == QMAT_OK) status = qmat_soup_to_mesh(context, &soup, path, options, &made, report);
+  if (status == QMAT_OK) status = make_surface(context, &soup, path, options, &made, report);
   qmat_soup_uninit(&soup);
   *mesh = made ? &made->base : NULL;
   return status;
@@ -224,7 +255,7 @@ static json_t *add_mesh_report(json_t *report, const separate_meshes *from, size
 static qmat_status make_mesh(qmat_context *context, const char *path, const qmat_soup *soup,
                              const qmat_read_options *options, qmat_value **mesh, json_t *report) {
   qmat_mesh *made = NULL;
-  qmat_status status = qmat_soup_to_mesh(context, soup, path, options, &made, report);
+  qmat_status status = make_surface(context, soup, path, options, &made, report);
   *mesh = made ? &made->base : NULL;
   if (status != QMAT_ERROR_GEOMETRY) return status;
   *mesh = qmat_failure_of_error(context);
@@ -239,7 +270,7 @@ static qmat_status make_meshes(qmat_context *context, const char *path, const se
   qmat_status status = QMAT_OK;
   if (from->count == 1) {
     qmat_mesh *made = NULL;
-    status = qmat_soup_to_mesh(context, &from->soups[0], path, options, &made, report);
+    status = make_surface(context, &from->soups[0], path, options, &made, report);
     *mesh = made ? &made->base : NULL;
     return status;
   }

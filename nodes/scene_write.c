@@ -196,7 +196,7 @@ static qmat_status write_gltf(qmat_context *context, const scene_write_params *p
     additions[i].collider_forms = collider_forms(params);
     additions[i].dynamic = !params->fixed;
     if (status == QMAT_OK)
-      status = add_vertex_data(context, params, placed && !kept && is_skinned(scene, i), &additions[i]);
+      status = add_vertex_data(context, params, kept || (placed && is_skinned(scene, i)), &additions[i]);
   }
   if (status == QMAT_OK)
     status = kept     ? qmat_gltf_enrich(context, scene, additions, count, params->draco_meshes, report, file)
@@ -412,6 +412,23 @@ static qmat_status find_moved(qmat_context *context, const qmat_scene *scene, bo
   return status;
 }
 
+/* How many nodes with one of the scene's meshes are instanced, and so have one body for all instances. */
+static qmat_status count_instanced(qmat_context *context, const qmat_scene *scene, size_t *count) {
+  qmat_gltf_asset asset;
+  *count = 0;
+  const qmat_status status =
+      qmat_gltf_asset_init(context, scene->parts[0].bytes, scene->parts[0].size, "the scene", &asset);
+  const json_t *nodes = status == QMAT_OK ? json_object_get(asset.root, "nodes") : NULL;
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    const json_t *node = json_array_get(nodes, i);
+    const int64_t mesh = qmat_gltf_mesh_of(node);
+    if (!json_object_get(json_object_get(node, "extensions"), "EXT_mesh_gpu_instancing")) continue;
+    for (size_t k = 0; k < scene->mesh_count; k++) *count += mesh == (int64_t)scene->meshes[k];
+  }
+  qmat_gltf_asset_uninit(&asset);
+  return status;
+}
+
 /* Warns of places and units that are not the scene's, and of colliders that a layer over a USD scene leaves out, since
  * no prim in it moves with a joint. */
 static qmat_status add_warnings(qmat_context *context, const scene_write_params *params,
@@ -420,8 +437,17 @@ static qmat_status add_warnings(qmat_context *context, const scene_write_params 
   const char *format = formats[params->format];
   bool moved = false;
   int bad = 0;
-  const qmat_status status = is_alone(params, scene) ? find_moved(context, scene, &moved) : QMAT_OK;
+  size_t instanced = 0;
+  qmat_status status = is_alone(params, scene) ? find_moved(context, scene, &moved) : QMAT_OK;
+  if (status == QMAT_OK && inputs[IN_COLLIDERS] && params->format <= FORMAT_GLTF && keeps_scene(params, scene))
+    status = count_instanced(context, scene, &instanced);
   if (status != QMAT_OK) return status;
+  if (instanced > 0)
+    bad |= qmat_json_add_warning(
+        report,
+        "colliders are not repeated for the instances of EXT_mesh_gpu_instancing: each of %zu nodes "
+        "with instances has one body",
+        instanced);
   if (moved)
     bad |= qmat_json_add_warning(report,
                                  "the .%s file has the mesh where its own coordinates are, not where the scene's nodes "
@@ -528,7 +554,8 @@ static const qmat_param params[] = {
               "other form is chosen"),
     QMAT_BOOL(scene_write_params, omi_physics,
               "Write colliders as OMI_physics_shape and OMI_physics_body (glb, gltf), which Godot reads"),
-    QMAT_BOOL(scene_write_params, unreal_hulls, "Write hulls of colliders as meshes named UCX_name_01 (glb, gltf)"),
+    QMAT_BOOL(scene_write_params, unreal_hulls,
+              "Write hulls of colliders as meshes named UCX_name_01 after their mesh (glb, gltf)"),
     QMAT_BOOL(scene_write_params, godot_hulls,
               "Write hulls of colliders as meshes named name_01-convcolonly (glb, gltf)"),
     QMAT_BOOL(scene_write_params, fixed, "Bodies with colliders do not move: they get no mass (glb, gltf, USD)"),
@@ -572,7 +599,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 21,
+    .version = 22,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "

@@ -34,8 +34,8 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
                                     : qmat_ply_write_medial(context, medial, NULL, &file);
   if (status == QMAT_OK) status = qmat_file_save(context, file, to);
   if (status == QMAT_OK && !qmat_invocation_value(invocation, "quiet")) {
-    printf("%s: %zu spheres, %zu cones, %zu slabs -> %s\n", from, medial->sphere_count, medial->edge_count,
-           medial->triangle_count, to);
+    printf("%s: %zu spheres, %zu cones, %zu slabs -> %s\n", qmat_show(from).text, medial->sphere_count,
+           medial->edge_count, medial->triangle_count, qmat_show(to).text);
   }
   if (file) qmat_value_release(&file->base);
   qmat_value_release(&medial->base);

@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "graphs/cli/command.h"
 #include "graphs/graph_format.h"
@@ -22,6 +23,17 @@ static int first_difference(const qmat_bytes *old, const qmat_writer *made) {
   return line;
 }
 
+/* Reads a graph file; as for other commands, that it cannot be read is a bad graph, and an empty one has a place. */
+static qmat_status read_file(qmat_context *context, const char *path, qmat_bytes *bytes) {
+  struct stat about;
+  if (qmat_bytes_read_file(context, path, bytes) == QMAT_OK) return QMAT_OK;
+  if (context->error.status == QMAT_ERROR_MEMORY) return QMAT_ERROR_MEMORY;
+  if (stat(path, &about) != 0 || !S_ISREG(about.st_mode) || about.st_size > 0)
+    return context->error.status = QMAT_ERROR_USAGE;
+  qmat_fail(context, QMAT_ERROR_USAGE, "the graph file is empty; it starts with 'qmat: 1'");
+  return qmat_fail_at(context, path, 1, 1);
+}
+
 static qmat_status format_file(const fmt_call *call, const char *name) {
   qmat_context *context = call->context;
   const bool is_stream = strcmp(name, "-") == 0;
@@ -29,7 +41,7 @@ static qmat_status format_file(const fmt_call *call, const char *name) {
   qmat_bytes old = {0};
   qmat_writer made = {0};
   qmat_status status = is_stream ? qmat_streams_read(context, call->streams, &path) : QMAT_OK;
-  if (status == QMAT_OK) status = qmat_bytes_read_file(context, path, &old);
+  if (status == QMAT_OK) status = read_file(context, path, &old);
   if (status == QMAT_OK) status = qmat_graph_format(context, path, (const char *)old.data, old.size, &made);
   const bool same = status == QMAT_OK && made.size == old.size && memcmp(made.bytes, old.data, old.size) == 0;
   if (status == QMAT_OK && call->check && !same) {
@@ -47,7 +59,7 @@ static qmat_status format_file(const fmt_call *call, const char *name) {
       qmat_value_release(&file->base);
     }
     free(real);
-    if (status == QMAT_OK && !call->quiet) printf("%s: laid out\n", name);
+    if (status == QMAT_OK && !call->quiet) printf("%s: laid out\n", qmat_show(name).text);
   }
   qmat_writer_uninit(&made);
   qmat_bytes_uninit(&old);
@@ -60,13 +72,15 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   const size_t count = invocation->argument_count;
   size_t failures = 0;
   qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < count; i++) {
+  for (size_t i = 0; i < count && status != QMAT_CANCELLED; i++) {
     const qmat_status of_one = format_file(&call, invocation->arguments[i]);
     if (of_one == QMAT_OK) continue;
     if (failures++ == 0 || of_one == QMAT_ERROR_USAGE) status = of_one;
-    if (count > 1) qmat_print_error(&context->error);
+    qmat_streams_name(&invocation->streams, &context->error);
+    if (of_one == QMAT_CANCELLED) status = of_one;
+    if (count > 1 && of_one != QMAT_CANCELLED) qmat_print_error(&context->error);
   }
-  if (count > 1 && failures > 0)
+  if (count > 1 && failures > 0 && status != QMAT_CANCELLED)
     qmat_fail(context, status, "%zu of %zu files %s", failures, count,
               call.check ? "have another layout or mistakes" : "have failed");
   return status;

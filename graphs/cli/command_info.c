@@ -15,7 +15,8 @@
 typedef struct info_call {
   qmat_context *context;
   const char *node, *against; /* --node and --against; NULL: not given */
-  json_t *json;               /* of the file at hand; NULL: the facts are printed */
+  const char *shown;          /* the name of the file at hand, for people */
+  json_t *json;               /* of that file; NULL: the facts are printed */
 } info_call;
 
 /* Prints a text of the file without its control characters. */
@@ -155,7 +156,7 @@ static qmat_status check_against(const info_call *call, const char *path, const 
   qmat_status status = qmat_model_read_meshes(context, path, &options, mesh_choice, &scene, &mesh, &read);
   if (status == QMAT_OK) {
     const double epsilon = number_of(facts, "qmat_epsilon");
-    if (!json) printf("against %s\n", path);
+    if (!json) printf("against %s\n", qmat_show(path).text);
     status = make_solid(call, epsilon, &mesh);
     if (status == QMAT_OK)
       status = run_node(context, "medial.evaluate", epsilon, (const qmat_value *const[]){mesh, &medial->base}, &output);
@@ -191,7 +192,7 @@ static qmat_status print_medial(const info_call *call, const char *path, const c
       json_object_update(json, facts);
       json_array_append_new(json_object_get(call->json, "medial_meshes"), json);
     } else {
-      printf("%s: a medial mesh of", path);
+      printf("%s: a medial mesh of", qmat_show(call->shown).text);
       for (size_t i = 0; rows[i].name; i++) printf("%s %zu %s", i ? "," : "", counts[i], rows[i].name);
       if (name) printf(" on node %s", qmat_show(name).text);
       printf("\n");
@@ -242,18 +243,22 @@ static qmat_status print_medials(const info_call *call, const char *path) {
   return status;
 }
 
-static void describe_surface(const info_call *call, const char *path, const qmat_mesh *mesh, const json_t *report) {
+/* Only that it was cancelled is an error. */
+static qmat_status describe_surface(const info_call *call, const qmat_mesh *mesh, const json_t *report) {
   qmat_value *outputs[2] = {NULL};
   if (call->json) json_object_set(call->json, "surface", (json_t *)(uintptr_t)report);
-  if (!call->json) printf("%s: a surface\n", path);
+  if (!call->json) printf("%s: a surface\n", qmat_show(call->shown).text);
   if (!call->json) print_object(report);
-  if (run_node(call->context, "mesh.solid", 0, (const qmat_value *const[]){&mesh->base}, outputs) != QMAT_OK) return;
+  const qmat_status status =
+      run_node(call->context, "mesh.solid", 0, (const qmat_value *const[]){&mesh->base}, outputs);
+  if (status != QMAT_OK) return status == QMAT_CANCELLED ? status : QMAT_OK;
   if (call->json)
     json_object_set(call->json, "solid", ((const qmat_report *)outputs[1])->root);
   else
     print_components(((const qmat_report *)outputs[1])->root);
   qmat_value_release(outputs[0]);
   qmat_value_release(outputs[1]);
+  return QMAT_OK;
 }
 
 static qmat_status describe_file(const info_call *call, const char *path) {
@@ -265,18 +270,21 @@ static qmat_status describe_file(const info_call *call, const char *path) {
   qmat_status status = qmat_model_read(context, path, &options, &scene, &mesh, &report);
   const bool has_surface = status == QMAT_OK;
   if (has_surface) {
-    describe_surface(call, path, mesh, report->root);
+    status = describe_surface(call, mesh, report->root);
     qmat_value_release(&scene->base);
     qmat_value_release(&mesh->base);
     qmat_value_release(&report->base);
   }
+  if (status == QMAT_CANCELLED) return status;
   const qmat_error first = context->error;
   const qmat_status carried = print_medials(call, path);
   if (carried == QMAT_OK) {
     status = QMAT_OK;
   } else if (call->against || call->node || (has_surface && carried != QMAT_ERROR_GEOMETRY)) {
     status = carried; /* its medial mesh is ambiguous, unreadable, or missing with --against or --node */
-  } else if (!has_surface) {
+  } else if (!has_surface && qmat_format_of_name(path) == QMAT_FORMAT_MA) {
+    status = carried; /* what is wrong with it, not that it has no surface */
+  } else if (!has_surface && carried != QMAT_CANCELLED) {
     context->error = first;
   }
   return status;
@@ -289,17 +297,20 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
   json_t *all = json_array();
   if (!all) return qmat_fail_memory(context, "listing");
   qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < count; i++) {
+  for (size_t i = 0; i < count && status != QMAT_CANCELLED; i++) {
     const char *path = invocation->arguments[i];
+    const bool is_stream = qmat_is_stream(path);
     info_call call = {context, qmat_invocation_value(invocation, "node"), qmat_invocation_value(invocation, "against"),
+                      is_stream ? "standard input" : path,
                       json ? json_pack("{s:o, s:[]}", "file", qmat_json_string(path), "medial_meshes") : NULL};
-    qmat_status of_one = qmat_is_stream(path) ? qmat_streams_read(context, &invocation->streams, &path) : QMAT_OK;
+    qmat_status of_one = is_stream ? qmat_streams_read(context, &invocation->streams, &path) : QMAT_OK;
     if (of_one == QMAT_OK) of_one = describe_file(&call, path);
+    if (of_one != QMAT_OK) qmat_streams_name(&invocation->streams, &context->error);
     if (call.json && of_one != QMAT_OK) json_object_update_new(call.json, qmat_error_report(&context->error));
     if (call.json) json_array_append_new(all, call.json);
     if (of_one == QMAT_OK) continue;
-    if (failures++ == 0) status = of_one;
-    if (count > 1) qmat_print_error(&context->error);
+    if (failures++ == 0 || of_one == QMAT_CANCELLED) status = of_one;
+    if (count > 1 && of_one != QMAT_CANCELLED) qmat_print_error(&context->error);
   }
   if (json) {
     const qmat_error error = context->error;
@@ -310,7 +321,8 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
       status = printed;
   }
   json_decref(all);
-  if (count > 1 && failures > 0) qmat_fail(context, status, "%zu of %zu files have failed", failures, count);
+  if (count > 1 && failures > 0 && status != QMAT_CANCELLED)
+    qmat_fail(context, status, "%zu of %zu files have failed", failures, count);
   return status;
 }
 

@@ -282,6 +282,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   if (status == QMAT_OK && depfile && !dry) status = qmat_run_write_depfile(context, run, depfile);
   if (status == QMAT_OK && report_path && !dry) {
     json_t *report = qmat_run_report(context, run);
+    qmat_streams_name_in(&invocation->streams, report);
     status = qmat_save_json(context, report, report_path);
     json_decref(report);
     reported = true;
@@ -291,6 +292,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   if (status != QMAT_OK && report_path && !reported &&
       (ready ? !qmat_run_has_read(run, report_path) : may_write_error(invocation, report_path))) {
     /* A failure to write the report must not replace this error. */
+    qmat_streams_name(&invocation->streams, &context->error);
     const qmat_error error = context->error;
     json_t *report = qmat_error_report(&error);
     if (ready && !dry) json_object_set_new(report, "warnings", qmat_run_warnings(run, false));

@@ -52,13 +52,19 @@ static void start_with_settings(char **argv) {
   execv("/proc/self/exe", argv);
 }
 
+static bool goes_on(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                    const char *unit) {
+  (void)user, (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  return !qmat_interrupted();
+}
+
 int main(int argc, char **argv) {
   start_with_settings(argv);
   /* Only the character set, for the progress bar: numbers are read and written without the locale. */
   setlocale(LC_CTYPE, "");
   qmat_catch_interrupts();
   signal(SIGXFSZ, SIG_IGN); /* a file size limit is then an error of write() and does not kill the program */
-  qmat_context context = {0};
+  qmat_context context = {.progress = goes_on}; /* of commands that show none */
   const char *name = argc > 1 ? argv[1] : "help";
   if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0) name = "help";
   if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0) name = "version";

@@ -23,7 +23,7 @@ static void on_interrupt(int number) {
   interrupted = 1;
 }
 
-static const int interrupts[] = {SIGHUP, SIGINT, SIGTERM};
+static const int interrupts[] = {SIGHUP, SIGINT, SIGQUIT, SIGTERM};
 enum { INTERRUPT_COUNT = sizeof interrupts / sizeof *interrupts };
 
 static sigset_t interrupt_set(void) {

@@ -56,7 +56,8 @@ void qmat_progress_view_connect(qmat_progress_view *view, qmat_context *context,
 /* Erases the line. */
 void qmat_progress_view_end(qmat_progress_view *view);
 
-/* Holds SIGHUP, SIGINT and SIGTERM back until qmat_catch_interrupts, also in the program that this one becomes. */
+/* Holds SIGHUP, SIGINT, SIGQUIT and SIGTERM back until qmat_catch_interrupts, also in the program that this one
+ * becomes. */
 void qmat_hold_interrupts(void);
 
 /* Makes these signals cancel the run, also those that were held back. A second signal ends the program at once. A

@@ -84,6 +84,17 @@ static qmat_status make_file(qmat_context *context, const qmat_run *run, qmat_ru
   return status == QMAT_OK ? qmat_file_check_sides(context, file->written, file->path) : status;
 }
 
+/* Whether another output of the folder has this side file: layers of one stem are over one original. */
+static bool is_shared(const part_group *group, const qmat_file_part *side) {
+  for (size_t i = 0; i < group->count; i++) {
+    const qmat_file_part *other = &group->parts[i];
+    if (strcmp(other->name, side->name) == 0 && other->size == side->size &&
+        memcmp(other->bytes, side->bytes, side->size) == 0)
+      return true;
+  }
+  return false;
+}
+
 static qmat_status add_file_parts(qmat_context *context, qmat_run_file *file, part_group *group) {
   /* qmat_file_save gives its path to the part without a name: the first of the group. */
   const char *main_name = group->count == 0 ? "" : file->path + qmat_folder_length(file->path);
@@ -92,7 +103,8 @@ static qmat_status add_file_parts(qmat_context *context, qmat_run_file *file, pa
   qmat_status status = qmat_digest_of(made->parts[0].bytes, file->bytes, &file->sha256);
   if (status != QMAT_OK) return qmat_fail(context, status, "cannot compute the digest of an output");
   for (size_t i = 0; i < made->part_count && status == QMAT_OK; i++)
-    status = add_part(context, group, i ? made->parts[i].name : main_name, made->parts[i].bytes, made->parts[i].size);
+    if (i == 0 || !is_shared(group, &made->parts[i]))
+      status = add_part(context, group, i ? made->parts[i].name : main_name, made->parts[i].bytes, made->parts[i].size);
   return status;
 }
 

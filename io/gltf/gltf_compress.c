@@ -21,6 +21,8 @@ typedef enum obstacle {
   OBSTACLE_NO_TRIANGLES,
   OBSTACLE_TARGETS,
   OBSTACLE_SHARED,
+  OBSTACLE_SPARSE,
+  OBSTACLE_OUTSIDE,
   OBSTACLE_DATA,
   OBSTACLE_REFUSED,
   OBSTACLE_COUNT
@@ -31,7 +33,9 @@ static const char *const obstacle_texts[OBSTACLE_COUNT] = {
     [OBSTACLE_NO_TRIANGLES] = "no indexed triangles",
     [OBSTACLE_TARGETS] = "morph targets",
     [OBSTACLE_SHARED] = "the data are also used by something else",
-    [OBSTACLE_DATA] = "the data are sparse, outside the binary chunk, invalid or unsupported",
+    [OBSTACLE_SPARSE] = "the data are sparse",
+    [OBSTACLE_OUTSIDE] = "the data are outside the binary chunk",
+    [OBSTACLE_DATA] = "the data are invalid or unsupported",
     [OBSTACLE_REFUSED] = "Draco cannot encode the data",
 };
 
@@ -105,6 +109,15 @@ static bool view_accessor(const compressor *c, json_int_t index, accessor_view *
   if (offset > length || (json_int_t)view->stride * (count - 1) + wide > length - offset) return false;
   view->bytes = c->chunk + start + offset;
   return true;
+}
+
+/* Why view_accessor, or what it found, does not do. */
+static obstacle data_obstacle(const compressor *c, json_int_t index) {
+  const json_t *accessor = member(c->root, "accessors", index);
+  const json_t *view = member(c->root, "bufferViews", whole(accessor, "bufferView", -1));
+  if (json_object_get(accessor, "sparse")) return OBSTACLE_SPARSE;
+  if (json_object_get(view, "extensions")) return OBSTACLE_COMPRESSED;
+  return view && whole(view, "buffer", -1) > 0 ? OBSTACLE_OUTSIDE : OBSTACLE_DATA;
 }
 
 /* ---- users of accessors ---- */
@@ -230,7 +243,7 @@ static qmat_status take_attribute(compressor *c, packing *p, const char *name, c
   accessor_view view;
   qmat_draco_number number;
   const json_int_t index = whole_of(value);
-  *why = OBSTACLE_DATA;
+  *why = data_obstacle(c, index);
   if (p->attribute_count == MOST_ATTRIBUTES || !view_accessor(c, index, &view) || !draco_number_of(view.type, &number))
     return QMAT_OK;
   const bool is_position = strcmp(name, "POSITION") == 0, is_normal = strcmp(name, "NORMAL") == 0;
@@ -259,7 +272,7 @@ static qmat_status take_attribute(compressor *c, packing *p, const char *name, c
 static qmat_status take_corners(compressor *c, packing *p, const json_t *value, obstacle *why) {
   accessor_view view;
   p->indices = whole_of(value);
-  *why = OBSTACLE_DATA;
+  *why = data_obstacle(c, p->indices);
   if (!view_accessor(c, p->indices, &view) || view.components != 1 || view.count % 3 != 0 ||
       (view.type != QMAT_GLTF_UNSIGNED_BYTE && view.type != QMAT_GLTF_UNSIGNED_SHORT &&
        view.type != QMAT_GLTF_UNSIGNED_INT))

@@ -9,169 +9,22 @@
 #include "core/node.h"
 #include "io/base64.h"
 #include "io/bytes.h"
-#include "io/draco.h"
-#include "io/flat_medial.h"
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_bind.h"
 #include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_compress.h"
+#include "io/gltf/gltf_earlier.h"
 #include "io/gltf/gltf_embed.h"
+#include "io/gltf/gltf_hull_names.h"
+#include "io/gltf/gltf_medial_text.h"
 #include "io/gltf/gltf_place.h"
 #include "io/gltf/gltf_rig.h"
 #include "io/gltf/gltf_skin.h"
 
 #define DATA_URI "data:application/octet-stream;base64,"
 
-/* ---- the medial mesh as text ---- */
-
-typedef struct medial_text {
-  char *base64;
-  int position_bits, radius_bits;
-  const double *origin; /* the spheres are relative to it */
-  double loss;          /* measured error of the encoding, model units */
-  char *flat;           /* base64 of the plain form; NULL: none */
-  bool flat_floats;
-  double flat_loss; /* as `loss` */
-  bool has_joints;  /* the plain form has the joints of the spheres */
-} medial_text;
-
-/* Encodes the medial mesh, decodes it again, and measures the loss. */
-static qmat_status encode_and_measure(qmat_context *context, const qmat_medial *medial, medial_text *text,
-                                      uint8_t **bytes, size_t *size) {
-  qmat_medial *decoded = NULL;
-  qmat_status status =
-      qmat_draco_encode_medial(context, medial, text->origin, text->position_bits, text->radius_bits, bytes, size);
-  if (status != QMAT_OK) return status;
-  status = qmat_draco_decode_medial(context, *bytes, *size, text->origin, &decoded);
-  if (status == QMAT_OK &&
-      (decoded->sphere_count != medial->sphere_count || decoded->edge_count != medial->edge_count ||
-       decoded->triangle_count != medial->triangle_count)) {
-    status = qmat_fail(context, QMAT_ERROR_INTERNAL, "the medial mesh that Draco decodes differs from the encoded one");
-  }
-  if (status == QMAT_OK) text->loss = qmat_medial_move(medial, decoded);
-  if (decoded) qmat_value_release(&decoded->base);
-  return status;
-}
-
-/* Encodes the plain form, decodes it again, and measures the loss. */
-static qmat_status encode_flat(qmat_context *context, const qmat_medial *medial, const double *errors,
-                               medial_text *text) {
-  uint8_t *bytes = NULL;
-  size_t size = 0;
-  qmat_medial *decoded = NULL;
-  uint16_t *joints = text->has_joints ? qmat_alloc(4 * medial->sphere_count, sizeof *joints) : NULL;
-  if (text->has_joints && !joints) return qmat_fail_memory(context, "the medial mesh as text");
-  for (size_t i = 0; joints && i < 4 * medial->sphere_count; i++) joints[i] = (uint16_t)medial->joints[i];
-  const qmat_sphere_data data = {.errors = errors, .joints = joints, .weights = medial->weights};
-  qmat_status status = qmat_flat_encode(context, medial, &data, text->origin, text->flat_floats, &bytes, &size);
-  if (status == QMAT_OK) status = qmat_flat_decode(context, bytes, size, text->origin, &decoded);
-  if (status == QMAT_OK) {
-    qmat_free(text->flat);
-    text->flat_loss = qmat_medial_move(medial, decoded);
-    text->flat = qmat_base64_encode(bytes, size);
-    if (!text->flat) status = qmat_fail_memory(context, "the medial mesh as text");
-  }
-  if (decoded) qmat_value_release(&decoded->base);
-  qmat_free(bytes);
-  qmat_free(joints);
-  return status;
-}
-
-static qmat_status make_flat_text(qmat_context *context, const qmat_medial *medial, const qmat_gltf_options *options,
-                                  medial_text *text) {
-  if (options->flat == QMAT_FLAT_NONE) return QMAT_OK;
-  text->flat_floats = options->flat == QMAT_FLAT_FLOAT;
-  qmat_status status = encode_flat(context, medial, options->sphere_errors, text);
-  if (status == QMAT_OK && options->flat == QMAT_FLAT_AUTO && text->flat_loss > options->quantisation) {
-    text->flat_floats = true;
-    status = encode_flat(context, medial, options->sphere_errors, text);
-  }
-  return status;
-}
-
-/* `has_skin`: a node with the mesh has one, which joints refer to. */
-static qmat_status make_medial_text(qmat_context *context, const qmat_medial *medial, const double *origin,
-                                    bool has_skin, const qmat_gltf_options *options, medial_text *text) {
-  double position_range, radius_range, allowed = options->quantisation;
-  bool choose_position = options->position_bits == 0, choose_radius = options->radius_bits == 0;
-  qmat_draco_medial_ranges(medial, &position_range, &radius_range);
-  *text = (medial_text){.position_bits = options->position_bits,
-                        .radius_bits = options->radius_bits,
-                        .origin = origin,
-                        .has_joints = has_skin && medial->skinned_count > 0};
-  if (choose_position) text->position_bits = qmat_draco_bits_for(3, position_range, allowed / 2);
-  if (choose_radius) text->radius_bits = qmat_draco_bits_for(1, radius_range, allowed / 2);
-
-  uint8_t *bytes = NULL;
-  size_t size = 0;
-  qmat_status status = encode_and_measure(context, medial, text, &bytes, &size);
-  /* The bound ignores single-precision rounding; a few more bits may compensate for it. */
-  for (int tries = 0; tries < 3 && status == QMAT_OK && text->loss > allowed; tries++) {
-    bool more_position = choose_position && text->position_bits < 30,
-         more_radius = choose_radius && text->radius_bits < 30;
-    if (!more_position && !more_radius) break;
-    text->position_bits += more_position;
-    text->radius_bits += more_radius;
-    qmat_free(bytes);
-    status = encode_and_measure(context, medial, text, &bytes, &size);
-  }
-  if (status == QMAT_OK) {
-    text->base64 = qmat_base64_encode(bytes, size);
-    if (!text->base64) status = qmat_fail_memory(context, "the medial mesh as text");
-  }
-  qmat_free(bytes);
-  if (status == QMAT_OK) status = make_flat_text(context, medial, options, text);
-  return status;
-}
-
-static bool set_count(json_t *object, const char *key, size_t count) {
-  return qmat_gltf_set(object, key, json_integer((json_int_t)count));
-}
-
 static bool is_zero(const double *origin) {
   return origin[0] == 0 && origin[1] == 0 && origin[2] == 0;
-}
-
-/* The extras that describe a medial mesh; NULL when out of memory. */
-static json_t *make_extras(const qmat_medial *medial, const medial_text *text, const qmat_stated_errors *stated) {
-  json_t *extras = json_object();
-  bool done = extras && qmat_gltf_set(extras, "qmat_version", json_string(QMAT_VERSION)) &&
-              qmat_gltf_set(extras, "qmat_data_format", json_string("draco")) &&
-              qmat_gltf_set(extras, "qmat_data", json_string(text->base64)) &&
-              set_count(extras, "qmat_vertices", medial->sphere_count) &&
-              set_count(extras, "qmat_edges", medial->edge_count) &&
-              set_count(extras, "qmat_triangles", medial->triangle_count);
-  const struct {
-    const char *key;
-    double value;
-  } errors[] = {
-      {"qmat_epsilon", stated->epsilon}, {"qmat_error_out", stated->error_out}, {"qmat_error_in", stated->error_in}};
-  bool any = false;
-  for (size_t i = 0; i < sizeof errors / sizeof *errors && done; i++) {
-    if (!isfinite(errors[i].value)) continue;
-    done = qmat_gltf_set(extras, errors[i].key, json_real(errors[i].value));
-    any = true;
-  }
-  if (any) done = done && qmat_gltf_set(extras, "qmat_error_unit", json_string("diagonal"));
-  if (stated->certified != QMAT_CERTIFICATE_UNKNOWN)
-    done = done && qmat_gltf_set(extras, "qmat_certified", json_boolean(stated->certified == QMAT_CERTIFICATE_YES));
-  done = done && qmat_gltf_set(extras, "qmat_quantisation", json_real(text->loss)) &&
-         qmat_gltf_set(extras, "qmat_quantisation_unit", json_string("model")) &&
-         set_count(extras, "qmat_position_bits", (size_t)text->position_bits) &&
-         set_count(extras, "qmat_radius_bits", (size_t)text->radius_bits) &&
-         qmat_gltf_set(extras, "qmat_frame", json_string("node"));
-  if (text->flat) {
-    done = done && qmat_gltf_set(extras, "qmat_flat", json_string(text->flat)) &&
-           qmat_gltf_set(extras, "qmat_flat_format", json_string(text->flat_floats ? "f32" : "u16")) &&
-           qmat_gltf_set(extras, "qmat_flat_quantisation", json_real(text->flat_loss));
-    if (text->has_joints) done = done && qmat_gltf_set(extras, "qmat_skinned", json_true());
-  }
-  static const char *const axes[] = {"qmat_origin_x", "qmat_origin_y", "qmat_origin_z"};
-  for (int k = 0; k < 3 && done && !is_zero(text->origin); k++)
-    done = qmat_gltf_set(extras, axes[k], json_real(text->origin[k]));
-  if (done) return extras;
-  json_decref(extras);
-  return NULL;
 }
 
 /* ---- JSON ---- */
@@ -182,19 +35,19 @@ static json_t *make_extras(const qmat_medial *medial, const medial_text *text, c
 typedef struct document {
   json_t *root;
   bool binary;
-  qmat_gltf_asset asset;           /* the asset that was read, or empty */
-  uint8_t *embedded;               /* the chunk with embedded files, then also asset.chunk; owned; may be NULL */
-  qmat_gltf_compressed compressed; /* compressed meshes, or empty; its chunk, if any, is then also asset.chunk */
-  qmat_writer data;                /* bytes to add to the buffers */
-  bool in_chunk;                   /* `data` goes into the GLB's chunk, not into a buffer with a URI */
-  size_t data_start;               /* offset of `data` after the asset's own chunk; 0: in another buffer */
-  json_int_t buffer;               /* number of the buffer that holds `data` */
-  json_int_t material;             /* of the skins; -1: not created yet */
-  const qmat_scene *places;        /* of a new asset: where the meshes are; NULL: one mesh, where it is */
-  size_t nodes_given;              /* of the asset that was read */
-  json_t *converter;               /* of a new asset: the node that turns units and axes; NULL: none yet */
-  qmat_gltf_rig rig;               /* of the places */
-  json_int_t *skins;               /* per place: its skin in the asset, -1: none; NULL: no place has one */
+  qmat_gltf_asset asset;            /* the asset that was read, or empty */
+  uint8_t *embedded;                /* the chunk with embedded files, then also asset.chunk; owned; may be NULL */
+  qmat_gltf_compressed compressed;  /* compressed meshes, or empty; its chunk, if any, is then also asset.chunk */
+  qmat_writer data;                 /* bytes to add to the buffers */
+  bool in_chunk;                    /* `data` goes into the GLB's chunk, not into a buffer with a URI */
+  size_t data_start;                /* offset of `data` after the asset's own chunk; 0: in another buffer */
+  json_int_t buffer;                /* number of the buffer that holds `data` */
+  json_int_t material;              /* of the skins; -1: not created yet */
+  const qmat_scene *places;         /* of a new asset: where the meshes are; NULL: one mesh, where it is */
+  size_t nodes_given, meshes_given; /* of the asset that was read */
+  json_t *converter;                /* of a new asset: the node that turns units and axes; NULL: none yet */
+  qmat_gltf_rig rig;                /* of the places */
+  json_int_t *skins;                /* per place: its skin in the asset, -1: none; NULL: no place has one */
 } document;
 
 /* The bytes as a data URI; NULL when out of memory. */
@@ -241,10 +94,13 @@ static void remove_extras(json_t *own) {
   }
 }
 
+static const double in_place[3] = {0, 0, 0}; /* where joints take the points of a mesh from */
+
 /* Adds a medial mesh and its skin to every node that references the mesh. The skin is always on a child. The medial
- * mesh is on a child if its origin is not the node's, or if the node's extras are not an object. */
+ * mesh is on a child if its origin is not the node's, or if the node's extras are not an object. A skin with joints
+ * moves by the skin of the node. */
 static bool add_to_carriers(document *document, json_int_t mesh, const json_t *extras, const double *origin,
-                            json_int_t skin) {
+                            json_int_t skin, bool has_joints) {
   json_t *nodes = json_object_get(document->root, "nodes");
   const size_t count = json_array_size(nodes);
   bool done = true;
@@ -258,7 +114,10 @@ static bool add_to_carriers(document *document, json_int_t mesh, const json_t *e
     } else {
       done = set_extras(node, extras);
     }
-    if (done && skin >= 0) done = add_child(document->root, node, json_pack("{s:I}", "mesh", skin), origin, "skin");
+    if (!done || skin < 0) continue;
+    json_t *child = json_pack("{s:I}", "mesh", skin), *moved_by = json_object_get(node, "skin");
+    if (child && has_joints && moved_by) done = qmat_gltf_set(child, "skin", json_incref(moved_by));
+    done = add_child(document->root, node, child, has_joints ? in_place : origin, "skin") && done;
   }
   return done;
 }
@@ -383,8 +242,21 @@ static qmat_status add_skins(qmat_context *context, document *document, size_t m
 
 /* ---- the document ---- */
 
-static qmat_status open_document(qmat_context *context, const qmat_scene *scene, const qmat_gltf_options *options,
+/* Takes what an earlier run added for the meshes that get medial meshes out of the asset. */
+static qmat_status drop_earlier(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
+                                document *document) {
+  const size_t count = json_array_size(json_object_get(document->root, "meshes"));
+  bool *is_replaced = qmat_calloc(count + 1, sizeof *is_replaced);
+  for (size_t i = 0; is_replaced && i < scene->mesh_count; i++)
+    if (scene->meshes[i] < count) is_replaced[scene->meshes[i]] = additions[i].medial != NULL;
+  const bool done = is_replaced && qmat_gltf_drop_earlier(document->root, is_replaced, &document->asset.chunk_size);
+  qmat_free(is_replaced);
+  return done ? QMAT_OK : qmat_fail_memory(context, "a glTF file");
+}
+
+static qmat_status open_document(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                                  document *document) {
+  const qmat_gltf_options *options = &additions[0].options;
   document->binary = document->in_chunk = options->binary;
   document->material = -1;
   if (!scene) {
@@ -405,7 +277,9 @@ static qmat_status open_document(qmat_context *context, const qmat_scene *scene,
     asset->chunk = document->embedded;
     asset->chunk_size = size;
   }
+  if (status == QMAT_OK && scene->mesh_count > 0) status = drop_earlier(context, scene, additions, document);
   document->nodes_given = json_array_size(json_object_get(document->root, "nodes"));
+  document->meshes_given = json_array_size(json_object_get(document->root, "meshes"));
   const json_t *buffers = json_object_get(document->root, "buffers");
   const bool has_chunk =
       asset->chunk && json_array_size(buffers) > 0 && !json_object_get(json_array_get(buffers, 0), "uri");
@@ -514,6 +388,10 @@ static qmat_status add_colliders(qmat_context *context, const qmat_scene *scene,
   static const double none[3] = {0, 0, 0};
   const json_t *nodes = json_object_get(document->root, "nodes");
   const size_t count = json_array_size(nodes);
+  /* Unreal finds the hulls of a mesh by its name. */
+  const json_t *meshes = json_object_get(document->root, "meshes");
+  const char *own = json_string_value(json_object_get(json_array_get(meshes, (size_t)mesh), "name"));
+  if (mesh >= 0 && own && *own) name = own;
   qmat_gltf_colliders added = {.colliders = addition->colliders,
                                .forms = addition->collider_forms,
                                .name = name ? name : "model",
@@ -542,29 +420,28 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   /* JSON must be UTF-8, but a file's name may be anything. */
   const char *name = options.name && options.name[0] && qmat_is_utf8(options.name) ? options.name : NULL;
   const qmat_mesh *mesh = addition->skin && addition->skin->triangle_count > 0 ? addition->skin : NULL;
-  medial_text text = {0};
+  qmat_gltf_medial_text text = {0};
   qmat_gltf_skin data = {0};
   json_int_t skin = -1;
   const size_t nodes_before = json_array_size(json_object_get(document->root, "nodes"));
   double origin[3];
   qmat_status status = QMAT_OK;
   qmat_storage_origin(addition->medial, mesh, options.quantisation, origin);
-  static const double in_place[3] = {0, 0, 0}; /* where joints take the points of a mesh from */
-  const bool has_rig = mesh && document->skins && addition->vertices.joints;
-  if (has_rig) status = add_skins(context, document, index);
+  const bool has_rig = mesh && (document->skins || of_mesh) && addition->vertices.joints;
+  if (has_rig && document->skins) status = add_skins(context, document, index);
   if (status == QMAT_OK)
-    status = make_medial_text(context, addition->medial, origin, of_mesh || has_rig, &options, &text);
+    status = qmat_gltf_medial_text_init(context, addition->medial, origin, of_mesh || has_rig, &options, &text);
   const qmat_stated_errors stated = qmat_errors_after_move(&options.errors, fmax(text.loss, text.flat_loss));
   const double skin_moved = options.compress_skin && !has_rig ? fmax(options.quantisation, DBL_MIN) : 0;
   const size_t offset = document->data_start + document->data.size;
   if (status == QMAT_OK && mesh)
     status = qmat_gltf_skin_put(context, mesh, has_rig ? in_place : origin, &addition->vertices, skin_moved, &data,
                                 &document->data);
-  json_t *extras = status == QMAT_OK ? make_extras(addition->medial, &text, &stated) : NULL;
+  json_t *extras = status == QMAT_OK ? qmat_gltf_medial_extras(addition->medial, &text, &stated) : NULL;
   bool done = extras && (!mesh || qmat_gltf_skin_add(document->root, &data, document->buffer, offset,
                                                      &document->material, name, scene != NULL, &skin));
   if (done && of_mesh) {
-    done = add_to_carriers(document, scene->meshes[index], extras, origin, skin);
+    done = add_to_carriers(document, scene->meshes[index], extras, origin, skin, has_rig);
   } else if (done) {
     done = document->places ? add_places(document, index, extras, origin, skin, &options)
                             : add_node(document, extras, origin, skin, name, &options, !scene);
@@ -575,8 +452,7 @@ static qmat_status add_medial(qmat_context *context, const qmat_scene *scene, si
   if (status == QMAT_OK && !done) status = qmat_fail_memory(context, "a glTF file");
   if (options.stated) *options.stated = stated;
   json_decref(extras);
-  qmat_free(text.base64);
-  qmat_free(text.flat);
+  qmat_gltf_medial_text_uninit(&text);
   return status;
 }
 
@@ -655,11 +531,13 @@ static qmat_status write_document(qmat_context *context, const qmat_scene *scene
                                   qmat_file **file) {
   document document = {.places = places};
   *file = NULL;
-  qmat_status status = open_document(context, scene, &additions[0].options, &document);
+  qmat_status status = open_document(context, scene, additions, &document);
   if (status == QMAT_OK && draco_meshes) status = compress_meshes(context, scene, additions, count, &document, report);
   if (status == QMAT_OK && places) status = add_rig(context, &document, &additions[0].options);
   for (size_t i = 0; i < count && status == QMAT_OK; i++)
     if (additions[i].medial) status = add_medial(context, scene, i, &additions[i], &document);
+  if (status == QMAT_OK && !qmat_gltf_number_hulls(document.root, document.meshes_given, document.nodes_given))
+    status = qmat_fail_memory(context, "a glTF file");
   if (status == QMAT_OK && !place_data(&document)) status = qmat_fail_memory(context, "a glTF file");
   if (status == QMAT_OK) status = make_file(context, scene, &document, file);
   close_document(&document);

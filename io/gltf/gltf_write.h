@@ -4,33 +4,8 @@
 
 #include <stdbool.h>
 
+#include "io/gltf/gltf_medial_text.h"
 #include "io/gltf/gltf_skin.h"
-#include "io/stored_medial.h"
-
-/* How the plain form of a medial mesh (qmat_flat) stores coordinates and radii. */
-typedef enum qmat_flat_form {
-  QMAT_FLAT_AUTO,  /* 16 bits where they suffice for `quantisation`, else single precision */
-  QMAT_FLAT_SHORT, /* 16 bits */
-  QMAT_FLAT_FLOAT, /* single precision */
-  QMAT_FLAT_NONE   /* there is no plain form */
-} qmat_flat_form;
-
-/* How to write a medial mesh, and its known errors. */
-typedef struct qmat_gltf_options {
-  bool binary;                 /* write a .glb; else a .gltf with its data as base64 */
-  bool embed;                  /* for a .glb: embed the files that a scene refers to */
-  bool compress_skin;          /* require KHR_draco_mesh_compression: smaller, but some engines reject it */
-  int position_bits;           /* 1 to 30; 0: chosen from `quantisation` */
-  int radius_bits;             /* the same */
-  qmat_flat_form flat;         /* of qmat_flat */
-  double quantisation;         /* allowed error of storage, model units; used if bits are 0, and by QMAT_FLAT_AUTO */
-  const char *name;            /* of the node and the mesh, UTF-8; NULL or "": none */
-  double meters_per_unit;      /* of the medial mesh, for a new asset; 0: unknown, taken for 1 */
-  bool is_z_up;                /* the same; else y is up */
-  const double *sphere_errors; /* as in qmat_sphere_data; NULL: not known */
-  qmat_stated_errors errors;   /* of the given medial mesh */
-  qmat_stated_errors *stated;  /* gets the errors that the file states; may be NULL */
-} qmat_gltf_options;
 
 /* Makes a glTF 2.0 file of a medial mesh: one scene with one node. glTF measures in metres and y is up; a medial mesh
  * in other units or with z up keeps its coordinates, and its node gets a parent that scales and turns it. The node has
@@ -89,13 +64,15 @@ qmat_status qmat_gltf_write_places(qmat_context *context, const qmat_scene *scen
  * preserved: the JSON gains keys and members at the end of arrays, and no byte of a buffer changes. `additions` has one
  * element per mesh of the scene (scene->mesh_count), in that mesh's space. If mesh_count is 0, it has one element for
  * the whole scene, in world space. Every node that references the mesh gets the extras above; they replace those of an
- * earlier run. If the node's extras are not an object, a new child gets them. The skin becomes a new child of the node.
- * Children are translated if the data have another origin. A medial mesh of the whole scene gets a new node with its
- * extras and skin. Skin data follow the GLB's binary chunk, or are in a new buffer. `binary` and `embed` must be the
- * same in all options. Files that the asset refers to and that are not embedded become further parts of `*file`
- * (qmat_gltf_side_parts). With `draco_meshes`, qmat_gltf_compress compresses the asset's own triangles within the
- * smallest `quantisation`; the errors in the extras include that movement. `report` (an object, may be NULL) then gains
- * draco_primitives and, if something is unchanged, warnings. Otherwise as qmat_gltf_write. */
+ * earlier run, all of whose additions to these nodes are taken out first (qmat_gltf_drop_earlier). If the node's extras
+ * are not an object, a new child gets them. The skin becomes a new child of the node, with the node's own skin where
+ * its vertices have joints. Hulls of colliders have the name of the asset's mesh. Children are translated if the data
+ * have another origin. A medial mesh of the whole scene gets a new node with its extras and skin. Skin data follow the
+ * GLB's binary chunk, or are in a new buffer. `binary` and `embed` must be the same in all options. Files that the
+ * asset refers to and that are not embedded become further parts of `*file` (qmat_gltf_side_parts). With
+ * `draco_meshes`, qmat_gltf_compress compresses the asset's own triangles within the smallest `quantisation`; the
+ * errors in the extras include that movement. `report` (an object, may be NULL) then gains draco_primitives and, if
+ * something is unchanged, warnings. Otherwise as qmat_gltf_write. */
 qmat_status qmat_gltf_enrich(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                              size_t count, bool draco_meshes, json_t *report, qmat_file **file);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/descriptor/medial_summary.h"
 
+#include <math.h>
 #include <stdio.h>
 
 #include "core/text.h"
@@ -38,12 +39,14 @@ static void describe_model(const json_t *summary, char *text, size_t size) {
     snprintf(text, size, "%s", what);
 }
 
-/* " (4.9 mm)", or nothing. `text` holds at least 56 bytes. */
-static void describe_size(const json_t *meters, char *text) {
+/* " (4.9 mm)" for that share of the diagonal, or nothing. `text` holds at least 56 bytes. */
+static void describe_size(const json_t *meters, const json_t *share, char *text) {
+  const double fraction = json_real_value(share);
   char size[48];
   text[0] = '\0';
   if (!meters) return;
-  qmat_format_length(json_real_value(meters), size);
+  const double length = json_real_value(meters);
+  qmat_format_length(length, fraction > 0 ? length / fraction : (double)INFINITY, size);
   snprintf(text, 56, " (%s)", size);
 }
 
@@ -54,8 +57,10 @@ static void write_sentence(const char *name, const json_t *summary, char *text, 
   qmat_format_count(sphere_count, spheres);
   qmat_format_bound(json_real_value(json_object_get(summary, "surface_to_envelope")), out);
   qmat_format_bound(json_real_value(json_object_get(summary, "envelope_to_surface")), in);
-  describe_size(json_object_get(summary, "surface_to_envelope_meters"), out_size);
-  describe_size(json_object_get(summary, "envelope_to_surface_meters"), in_size);
+  describe_size(json_object_get(summary, "surface_to_envelope_meters"), json_object_get(summary, "surface_to_envelope"),
+                out_size);
+  describe_size(json_object_get(summary, "envelope_to_surface_meters"), json_object_get(summary, "envelope_to_surface"),
+                in_size);
   describe_model(summary, model, sizeof model);
   const char *proof = "";
   if (json_is_true(certified))

@@ -197,9 +197,16 @@ static void test_lengths_are_rounded_up_in_a_fitting_unit(void **state) {
                  {3.14, "3.2 m"},   {1234, "1234 m"}};
   char text[48];
   for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
-    qmat_format_length(lengths[i].meters, text);
+    qmat_format_length(lengths[i].meters, (double)INFINITY, text);
     assert_string_equal(text, lengths[i].text);
   }
+  /* Of a model of 37 nm nothing is as long as 0.001 mm. */
+  qmat_format_length(1.6e-10, 3.7e-8, text);
+  assert_string_equal(text, "1.6e-07 mm");
+  qmat_format_length(1e-20, 3.7e-8, text);
+  assert_string_equal(text, "3.7e-10 mm");
+  qmat_format_length(1e-312, 1e-310, text);
+  assert_true(atof(text) > 0);
 }
 
 static void test_lengths_are_read_with_their_unit(void **state) {

@@ -182,6 +182,33 @@ static void test_what_is_not_read_is_refused_by_name(void **state) {
   assert_not_read("a.off", "", 0, QMAT_ERROR_FORMAT, "the file is empty", "");
 }
 
+static void test_a_model_that_cannot_be_measured_is_refused_by_its_file(void **state) {
+  (void)state;
+  static const char *const sizes[] = {"1e308", "3e307", "1e307"};
+  for (size_t i = 0; i < 3; i++) {
+    char text[256];
+    const int length =
+        snprintf(text, sizeof text, "OFF\n4 4 0\n0 0 0\n%s 0 0\n0 %s 0\n0 0 %s\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n",
+                 sizes[i], sizes[i], sizes[i]);
+    qmat_context context = {0};
+    qmat_scene *scene;
+    qmat_mesh *mesh;
+    qmat_report *report;
+    const qmat_status status = read_as(&context, "huge.off", text, (size_t)length, &scene, &mesh, &report);
+    assert_int_equal(status, i < 2 ? QMAT_ERROR_GEOMETRY : QMAT_OK);
+    if (i < 2) {
+      assert_null(mesh);
+      assert_string_equal(context.error.message, "its bounding box is too large to be measured");
+      assert_non_null(strstr(context.error.file, "huge.off"));
+    } else {
+      qmat_value_release(&scene->base);
+      qmat_value_release(&mesh->base);
+      qmat_value_release(&report->base);
+    }
+    qmat_context_uninit(&context);
+  }
+}
+
 static void test_a_failure_after_reading_leaves_no_values(void **state) {
   (void)state;
   static const char nan[] = "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n";
@@ -316,6 +343,7 @@ int main(void) {
       cmocka_unit_test(test_a_scene_knows_its_unit_where_the_format_has_one),
       cmocka_unit_test(test_a_wrong_extension_is_an_error_that_names_the_content),
       cmocka_unit_test(test_what_is_not_read_is_refused_by_name),
+      cmocka_unit_test(test_a_model_that_cannot_be_measured_is_refused_by_its_file),
       cmocka_unit_test(test_a_failure_after_reading_leaves_no_values),
       cmocka_unit_test(test_a_medial_mesh_is_not_read_from_a_file_of_another_format),
       cmocka_unit_test(test_looking_at_any_bytes_is_safe),

@@ -553,6 +553,44 @@ static void test_bodies_that_are_fixed_have_colliders_and_no_mass(void **state) 
   qmat_value_release(&medial->base);
 }
 
+/* Unreal finds hulls by the name of their mesh, which the file's name is not. */
+static void test_hulls_have_the_name_of_their_mesh_and_instances_share_a_body(void **state) {
+  (void)state;
+  static const char asset[] =
+      "{'asset':{'version':'2.0'},'scenes':[{'nodes':[0]}],'extensionsUsed':['EXT_mesh_gpu_instancing'],"
+      "'nodes':[{'mesh':0,'extensions':{'EXT_mesh_gpu_instancing':{'attributes':{'TRANSLATION':0}}}}],"
+      "'meshes':[{'name':'Crate','primitives':[{'attributes':{'POSITION':0}}]}],"
+      "'accessors':[{'bufferView':0,'componentType':5126,'count':8,'type':'VEC3','min':[0,0,0],'max':[1,1,1]}],"
+      "'bufferViews':[{'buffer':0,'byteLength':96}],'buffers':[{'byteLength':96}]}";
+  qmat_writer data = {0};
+  put_box_corners(&data, 1);
+  qmat_writer glb = asset_glb(asset, data.bytes, data.size);
+  qmat_scene *scene = make_gltf_scene("file", &glb);
+  qmat_medial *medial = make_medial();
+  qmat_colliders *c = make_colliders();
+  const char *const settings[][2] = {{"unreal_hulls", "true"}, {"godot_hulls", "true"}, {NULL, NULL}};
+  qmat_report *report;
+  qmat_file *file = must_write_with_report(medial, (wiring){.scene = scene, .colliders = c}, settings, &report);
+  json_t *root = glb_root(file);
+  assert_int_equal(shown_as(root, "UCX_Crate_01"), 1);
+  assert_int_equal(shown_as(root, "Crate_01-convcolonly"), 1);
+  const json_t *warnings = json_object_get(report->root, "warnings");
+  assert_int_equal(json_array_size(warnings), 1);
+  assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), "EXT_mesh_gpu_instancing"));
+  json_decref(root);
+  qmat_value_release(&file->base);
+  qmat_value_release(&report->base);
+  file = must_write_with_report(medial, (wiring){.scene = scene}, NULL, &report);
+  assert_int_equal(json_array_size(json_object_get(report->root, "warnings")), 0);
+  qmat_value_release(&file->base);
+  qmat_value_release(&report->base);
+  qmat_value_release(&c->base);
+  qmat_value_release(&medial->base);
+  qmat_value_release(&scene->base);
+  qmat_writer_uninit(&glb);
+  qmat_writer_uninit(&data);
+}
+
 /* `draco` is about the skin, `draco_meshes` about the triangles of the scene. */
 static void test_triangles_of_a_scene_are_compressed_where_that_is_chosen(void **state) {
   (void)state;
@@ -695,6 +733,7 @@ int main(void) {
       cmocka_unit_test(test_files_for_robots_are_in_metres),
       cmocka_unit_test(test_each_form_of_colliders_is_written_where_it_is_chosen),
       cmocka_unit_test(test_bodies_that_are_fixed_have_colliders_and_no_mass),
+      cmocka_unit_test(test_hulls_have_the_name_of_their_mesh_and_instances_share_a_body),
       cmocka_unit_test(test_triangles_of_a_scene_are_compressed_where_that_is_chosen),
       cmocka_unit_test(test_compression_does_not_apply_to_formats_that_have_none),
       cmocka_unit_test(test_a_medial_mesh_without_spheres_is_refused),

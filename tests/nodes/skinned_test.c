@@ -128,6 +128,7 @@ static qmat_value *write_described(const char *params, const char *write_params,
   const qmat_value *inputs[PIPELINE_MOST_PORTS] = {NULL};
   inputs[qmat_input_find(write, "medial")] = simple[0];
   inputs[qmat_input_find(write, "scene")] = read[0];
+  inputs[qmat_input_find(write, "skin")] = solid[0]; /* any surface; only skin_beside shows it */
   qmat_value *shapes[PIPELINE_MOST_PORTS] = {NULL};
   if (params) {
     pipeline_must_run(1, "medial.colliders", params, (const qmat_value *[]){solid[0], simple[0]}, shapes);
@@ -241,6 +242,35 @@ static void test_colliders_of_a_skinned_model_follow_its_joints(void **state) {
   (void)state;
   colliders_must_follow("format=glb");
   colliders_must_follow("format=gltf");
+}
+
+static void test_a_skin_beside_a_skinned_mesh_moves_with_it(void **state) {
+  (void)state;
+  qmat_value *colliders, *written = write_described("fit=contain kind=capsules", "skin_beside=true", &colliders);
+  const qmat_file *file = (const qmat_file *)written;
+  qmat_context context = {0};
+  qmat_gltf_asset asset;
+  assert_int_equal(qmat_gltf_asset_init(&context, file->parts[0].bytes, file->parts[0].size, "arm", &asset), QMAT_OK);
+  const json_t *nodes = json_object_get(asset.root, "nodes"), *node;
+  size_t i, count = 0;
+  json_array_foreach(nodes, i, node) {
+    const int64_t mesh = qmat_gltf_mesh_of(node);
+    if (i == 0 || mesh < 0) continue;
+    count++;
+    assert_true(qmat_gltf_is_skin(asset.root, (size_t)mesh));
+    assert_true(json_is_integer(json_object_get(node, "skin")));
+    assert_int_equal(json_integer_value(json_object_get(node, "skin")), 0);
+    assert_null(json_object_get(node, "translation"));
+    const json_t *object = json_array_get(json_object_get(asset.root, "meshes"), (size_t)mesh);
+    const json_t *attributes = json_object_get(json_array_get(json_object_get(object, "primitives"), 0), "attributes");
+    assert_non_null(json_object_get(attributes, "JOINTS_0"));
+    assert_non_null(json_object_get(attributes, "WEIGHTS_0"));
+  }
+  assert_int_equal(count, 1);
+  qmat_gltf_asset_uninit(&asset);
+  qmat_context_uninit(&context);
+  qmat_value_release(written);
+  qmat_value_release(colliders);
 }
 
 /* ---- USD ---- */
@@ -511,6 +541,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_spheres_of_a_skinned_model_follow_its_joints),
       cmocka_unit_test(test_colliders_of_a_skinned_model_follow_its_joints),
+      cmocka_unit_test(test_a_skin_beside_a_skinned_mesh_moves_with_it),
       cmocka_unit_test(test_joints_of_usd_meshes_reach_their_spheres_and_the_layer),
       cmocka_unit_test(test_a_skinned_usd_model_moves_as_gltf),
       cmocka_unit_test(test_a_subdivided_cage_keeps_its_joints),

@@ -211,7 +211,7 @@ expect 0 "" "$qmat" mat box.off -o box.ply --epsilon 5% $coarse --quiet
 expect 0 "box.ply: a medial mesh of" "$qmat" info box.ply
 "$qmat" info - <box.off >out.txt 2>err.txt
 holds "info of the standard input" test $? -eq 0
-holds "what is on the standard input" grep -q 'stdin: a surface$' out.txt
+holds "what is on the standard input" grep -q '^standard input: a surface$' out.txt
 sed 's/^{$/{"images": [{"uri": "\\u001b[2J.png"}],/' box.gltf >odd.gltf
 expect 0 'the file "?[2J.png" cannot be read' "$qmat" info odd.gltf
 expect 1 "OFF does not carry" "$qmat" info box.off --against box.off
@@ -295,6 +295,46 @@ code=$?
 holds "exit code 3 after a signal, not $code" test $code -eq 3
 holds "the cancelled node is named" grep -q 'cancelled' err.txt
 holds "no file after a signal" test ! -e torus.glb
+
+# So does qmat info, where a solid takes long to make: 300 boxes in one another's way.
+awk 'BEGIN {
+  n = 300
+  printf "OFF\n%d %d 0\n", 8 * n, 6 * n
+  for (i = 0; i < n; i++) for (k = 0; k < 8; k++) {
+    a = i * 0.7; x = k % 2 - 0.5; y = int(k / 2) % 2 - 0.5; z = int(k / 4) - 0.5
+    printf "%.9f %.9f %.9f\n", x * cos(a) - y * sin(a) + sin(i * 1.3), x * sin(a) + y * cos(a) + cos(i * 2.1), z + sin(i * 3.7)
+  }
+  split("0 2 3 1 4 5 7 6 0 1 5 4 2 6 7 3 0 4 6 2 1 3 7 5", f, " ")
+  for (i = 0; i < n; i++) for (q = 0; q < 6; q++) {
+    printf "4"
+    for (k = 1; k <= 4; k++) printf " %d", 8 * i + f[4 * q + k]
+    print ""
+  }
+}' >heap.off
+"$qmat" info heap.off box.off >out.txt 2>err.txt &
+running=$!
+tries=0
+while ! grep -q 'a surface' out.txt && kill -0 $running 2>/dev/null && [ $tries -lt 20 ]; do
+  sleep 0.1
+  tries=$((tries + 1))
+done
+kill -TERM $running
+wait $running
+code=$?
+holds "qmat info has exit code 3 after a signal, not $code" test $code -eq 3
+holds "the signal ends all files" sh -c '! grep -q "box.off: a surface" out.txt && grep -q "mesh.solid: cancelled" err.txt'
+
+# What is wrong with a medial mesh is said, not that it is no surface.
+printf '1 0 0\nv 0 0 0 -1\n' >negative.ma
+expect 1 "negative.ma:2:9: sphere 0: the radius of a sphere is negative" "$qmat" info negative.ma
+printf 'OFF\n4 4 0\n0 0 0\n1e308 0 0\n0 1e308 0\n0 0 1e308\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n' >huge.off
+expect 1 "huge.off: node 'model' (scene.read): its bounding box is too large to be measured" "$qmat" mat huge.off -o huge.ma
+expect 1 "huge.off: its bounding box is too large to be measured" "$qmat" info huge.off
+
+# Layers of one stem share their original.
+printf '#usda 1.0\ndef Cube "Cube"\n{\n}\n' >layer.usda
+expect 0 "" "$qmat" mat layer.usda -o both/a.usda -o both/a.usdc --epsilon 10% $coarse
+holds "three files" test "$(ls both | tr '\n' ' ')" = "a.usda a.usdc a_original.usda "
 
 # A locale with a decimal comma changes nothing.
 if mkdir locale && localedef -i de_DE -f UTF-8 locale/de_DE.UTF-8 2>/dev/null; then

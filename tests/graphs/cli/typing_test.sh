@@ -28,6 +28,41 @@ expect 2 "only one file can go to" "$qmat" mat box.off -o - -o -.ma $coarse
 echo "OFF 1 2" | expect 1 "qmat: standard input:1:6: " "$qmat" mat - -o out.ma
 printf 'qmat: 1\nnodes:\n  a: { type: mesh.sfd }\n' | expect 2 "standard input:3:14: " "$qmat" check -
 holds "nothing is left in the temporary folder" test -z "$(ls temporary)"
+"$qmat" info - <box.off >out.txt 2>err.txt
+holds "the standard input by its name" grep -qx "standard input: a surface" out.txt
+echo "OFF 1 2" | expect 1 "qmat: standard input:1:6: " "$qmat" info - nothere.off
+echo "OFF 1 2" >broken.off
+"$qmat" info - --json <broken.off >out.txt 2>err.txt
+holds "no path that nobody knows" sh -c '! grep -q temporary out.txt err.txt'
+holds "the standard input in JSON" grep -q '"file": "standard input"' out.txt
+for signal in HUP INT QUIT TERM; do
+  mkfifo pipe
+  sh -c 'trap - HUP INT QUIT TERM; exec env --default-signal "$0" mat - -o waiting.ma <pipe' "$qmat" >out.txt 2>err.txt &
+  waiting=$!
+  exec 9>pipe
+  tries=0
+  while [ -z "$(ls temporary)" ] && [ $tries -lt 100 ]; do
+    sleep 0.1
+    tries=$((tries + 1))
+  done
+  kill -$signal $waiting
+  wait $waiting
+  code=$?
+  exec 9>&-
+  rm pipe
+  holds "SIG$signal ends a read that waits: exit $code" test $code -eq 3
+  holds "SIG$signal leaves nothing behind" test -z "$(ls temporary)" -a ! -e waiting.ma
+done
+
+"$qmat" mat - -o out.ma --report failed.json <broken.off >out.txt 2>err.txt
+"$qmat" mat - -o out.ma --report run.json $coarse -q <box.off >out.txt 2>err.txt
+holds "reports of a failure and of a run name the standard input" \
+  sh -c 'grep -q "\"file\": \"standard input\"" failed.json && grep -q "\"-\"" run.json && ! grep -q "temporary/" failed.json run.json'
+
+# Names cannot move the cursor.
+cp box.off "$(printf 'b\033[2Jx.off')"
+"$qmat" info "$(printf 'b\033[2Jx.off')" >out.txt 2>err.txt
+holds "no escape sequence of a file's name" sh -c '! grep -q "$(printf "\\033")" out.txt'
 
 # Output folders are made, but not by a mistake.
 expect 0 "deep/down/box.glb (" "$qmat" mat box.off -o deep/down/box.glb --report deep/reports/box.json $coarse
@@ -113,9 +148,16 @@ expect 1 "loose.yaml:1: the layout differs from here ('qmat fmt loose.yaml' mend
 holds "--check writes nothing" cmp loose.yaml before.yaml
 "$qmat" fmt - <loose.yaml >out.txt 2>err.txt
 holds "the standard input to the standard output" cmp out.txt laid_out.yaml
-expect 1 "2 of 3 files" "$qmat" fmt nothere.yaml --check laid_out.yaml loose.yaml
+expect 2 "2 of 3 files" "$qmat" fmt nothere.yaml --check laid_out.yaml loose.yaml
 expect 0 "loose.yaml: laid out" "$qmat" fmt loose.yaml laid_out.yaml
 holds "a file is laid out" cmp loose.yaml laid_out.yaml
+# What cannot be read has the exit code of other commands.
+: >empty.yaml
+for command in check fmt; do
+  expect 2 "empty.yaml:1:1: the graph file is empty" "$qmat" $command empty.yaml
+  expect 2 "No such file or directory" "$qmat" $command nothere.yaml
+  expect 2 "this is a folder" "$qmat" $command .
+done
 printf 'qmat: 1\nnodes: [a]\n' >loose.yaml
 expect 2 "loose.yaml:2:8: lists are not" "$qmat" fmt loose.yaml
 expect 2 "this is not a graph file" "$qmat" fmt box.off
@@ -127,6 +169,9 @@ holds "what a link names is laid out" cmp before.yaml laid_out.yaml
 # Colliders.
 expect 0 "box.xml (" "$qmat" mat box.off -o box.xml --colliders --kind spheres --epsilon 10% --set samples.spacing=10%
 holds "MuJoCo's colliders" grep -q '<geom .*type="sphere"' box.xml
+expect 1 "require: not certified" "$qmat" mat box.off -o bad.glb --colliders --kind spheres --require certified \
+  --epsilon 10% --set samples.spacing=10% --set errors.epsilon=0.0001%
+holds "what is not certified is not written" test ! -e bad.glb
 expect 0 "" "$qmat" run colliders --set model=box.off --set kind=spheres --set epsilon=10% --set samples.spacing=10% \
   -o run.xml
 holds "as the graph makes them" cmp run.xml box.xml

@@ -199,7 +199,8 @@ static void test_what_cannot_be_taken_stays_as_it_is(void **state) {
        "Draco cannot encode the data", 0}, /* corner 0 again and again */
       {"'byteOffset':4,", "'byteOffset':9,", "invalid or unsupported", 0},
       {"'componentType':5121", "'componentType':5125", "invalid or unsupported", 0},
-      {"'buffer':0,'byteLength':96", "'buffer':1,'byteLength':96", "outside the binary chunk", 0},
+      {"'buffer':0,'byteLength':96", "'buffer':1,'byteLength':96", "the data are outside the binary chunk", 0},
+      {"'count':36", "'sparse':{},'count':36", "the data are sparse", 0},
       {"'buffer':0,'byteLength':96", "'buffer':0,'byteLength':95", "invalid or unsupported", 0},
       {"'buffer':0,'byteLength':96", "'buffer':0,'byteOffset':1e30,'byteLength':96", "invalid or unsupported", 0},
       {"'asset'", "'extensionsUsed':['ACME_more'],'asset'", "ACME_more", 0},
