@@ -200,8 +200,12 @@ static void colliders_must_follow(const char *write_params) {
   qmat_gltf_asset asset;
   assert_int_equal(qmat_gltf_asset_init(&context, file->parts[0].bytes, file->parts[0].size, "arm", &asset), QMAT_OK);
   const json_t *nodes = json_object_get(asset.root, "nodes");
+  const qmat_colliders *made = (const qmat_colliders *)colliders;
   size_t count = 0, left = 0, right = 0;
+  assert_int_equal(made->joint_count, made->shape_count);
   for (size_t joint = 0; joint < 2; joint++) {
+    size_t of_joint = 0, before = count;
+    for (size_t i = 0; i < made->joint_count; i++) of_joint += made->joints[i] == joint;
     const json_t *children = json_object_get(json_array_get(nodes, joint + 1), "children");
     for (size_t c = 0; c < json_array_size(children); c++) {
       const json_t *bound = json_array_get(nodes, (size_t)number_at(children, c));
@@ -226,8 +230,9 @@ static void colliders_must_follow(const char *write_params) {
         }
       }
     }
+    assert_int_equal(count - before, of_joint);
   }
-  assert_int_equal(count, ((const qmat_colliders *)colliders)->shape_count);
+  assert_int_equal(count, made->shape_count);
   assert_true(left > 0 && right > 0);
   const json_t *own = json_object_get(json_array_get(nodes, 0), "children"); /* the mesh's node has none */
   assert_int_equal(json_array_size(own), 0);
