@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/vector.h"
+#include "nodes/colliders/joint_points.h"
 #include "nodes/colliders/shape_set.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
@@ -208,6 +209,27 @@ static void test_a_cone_is_divided_where_the_joint_changes(void **state) {
   result_free(&r);
 }
 
+static void test_what_is_between_the_parts_of_a_cone_is_halved(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  double spheres[] = {-2, 0, 0, 0.5, 2, 0, 0, 0.5}, places[] = {-1, 0.5, 0, 0, 1, 0.5, 0, 0, 1.4, 0.5, 0, 0};
+  uint32_t edges[] = {0, 1}, of_points[] = {4, 9, 9}, *joints;
+  const qmat_medial unit = {.sphere_count = 2, .edge_count = 1, .spheres = spheres, .edges = edges};
+  const qmat_joint_points points = {.count = 3, .points = places, .joints = of_points, .joint_count = 2};
+  qmat_medial divided;
+  assert_int_equal(qmat_joint_points_divide(&context, &points, &unit, &divided, &joints), QMAT_OK);
+  assert_int_equal(divided.sphere_count, 4);
+  assert_int_equal(divided.edge_count, 2);
+  static const double expected[] = {-2, 0, 0, 2};
+  for (size_t i = 0; i < 4; i++) {
+    assert_int_equal(divided.edges[i], i);
+    assert_int_equal(joints[i], i < 2 ? 4 : 9);
+    assert_near(divided.spheres[4 * i], expected[i], 1e-12);
+    assert_near(divided.spheres[4 * i + 3], 0.5, 1e-12);
+  }
+  qmat_context_uninit(&context);
+}
+
 static void test_a_slab_is_divided_where_the_joint_changes(void **state) {
   (void)state;
   const double spheres[] = {-1.2, -0.1, 0, 0.3, 1.2, -0.1, 0, 0.3, 0, 0.1, 0, 0.3};
@@ -305,6 +327,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_bent_arm_stays_inside_the_shapes_of_its_joints),
       cmocka_unit_test(test_a_cone_is_divided_where_the_joint_changes),
+      cmocka_unit_test(test_what_is_between_the_parts_of_a_cone_is_halved),
       cmocka_unit_test(test_a_slab_is_divided_where_the_joint_changes),
       cmocka_unit_test(test_both_arms_of_a_biped_have_shapes),
       cmocka_unit_test(test_shapes_of_two_joints_are_not_joined),
