@@ -53,7 +53,7 @@ static void find_foot(const division *d, size_t point) {
   qmat_envelope_distance(d->envelope, place, &primitive);
   foot->primitive = (uint32_t)primitive;
   foot->joint = d->points->joints[point];
-  double weights[3];
+  double weights[3] = {0};
   (void)qmat_envelope_foot_within(d->envelope, place, INFINITY, ids, weights);
   for (int k = 0; k < DIRECTIONS; k++) foot->low[k] = foot->high[k] = along(weights, k);
 }
