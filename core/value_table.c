@@ -471,13 +471,11 @@ static qmat_status check_list(qmat_context *context, const qmat_value *value) {
   return QMAT_OK;
 }
 
-static const qmat_value_row colliders_rows[] = {ARRAY(qmat_colliders, spheres, F64, sphere_count, 4),
-                                                ARRAY(qmat_colliders, shapes, U32, shape_count, 3),
-                                                ARRAY(qmat_colliders, points, F64, point_count, 3),
-                                                ARRAY(qmat_colliders, triangles, U32, triangle_count, 3),
-                                                ARRAY(qmat_colliders, hull_ends, U32, shape_count, 2),
-                                                ARRAY(qmat_colliders, body, F64, body_count, 10),
-                                                END};
+static const qmat_value_row colliders_rows[] = {
+    ARRAY(qmat_colliders, spheres, F64, sphere_count, 4),  ARRAY(qmat_colliders, shapes, U32, shape_count, 3),
+    ARRAY(qmat_colliders, points, F64, point_count, 3),    ARRAY(qmat_colliders, triangles, U32, triangle_count, 3),
+    ARRAY(qmat_colliders, hull_ends, U32, shape_count, 2), ARRAY(qmat_colliders, body, F64, body_count, 10),
+    ARRAY(qmat_colliders, joints, U32, joint_count, 1),    END};
 
 /* The hulls follow each other, and each names only its own points. */
 static qmat_status check_hulls(qmat_context *context, const qmat_colliders *c) {
@@ -528,6 +526,8 @@ static qmat_status check_colliders(qmat_context *context, const qmat_value *valu
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "its radius is 0");
     status = qmat_fail_element(context, "sphere", (int64_t)i);
   }
+  if (status == QMAT_OK && c->joint_count > 0 && c->joint_count != c->shape_count)
+    status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "%zu joints for %zu shapes", c->joint_count, c->shape_count);
   return status == QMAT_OK ? check_hulls(context, c) : status;
 }
 

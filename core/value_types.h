@@ -172,6 +172,8 @@ typedef struct qmat_colliders {
   double *points;      /* 3 * point_count: of all hulls, shape by shape */
   uint32_t *triangles; /* 3 * triangle_count: point ids, counter-clockwise from outside, shape by shape */
   uint32_t *hull_ends; /* 2 * shape_count: the end of its points, and of its triangles */
+  size_t joint_count;  /* shape_count, or 0 without a skin */
+  uint32_t *joints;    /* joint_count: the joint that moves a shape, numbered as in qmat_mesh */
   size_t body_count;   /* 1; 0: mass properties are not known */
   /* Mass in kg; centre x y z; inertia about it xx yy zz xy xz yz, in kg times the square of a model unit (products with
    * their sign in the tensor). */

@@ -10,6 +10,7 @@
 #include "nodes/colliders/hull_merge.h"
 #include "nodes/colliders/hull_outside.h"
 #include "nodes/colliders/inside_fit.h"
+#include "nodes/colliders/joint_points.h"
 #include "nodes/colliders/rigid_body.h"
 #include "nodes/colliders/shape_hulls.h"
 #include "nodes/colliders/shape_measures.h"
@@ -36,6 +37,8 @@ typedef struct work {
   qmat_surface *surface;
   qmat_envelope *envelope;
   qmat_shape_set set;
+  qmat_joint_points skin; /* none where the mesh has no skin */
+  uint32_t *joints;       /* of the spheres that shapes are made of; NULL: one joint moves all, or none */
   qmat_colliders *colliders;
   double volume;          /* of the solid, in the unit frame; 0: not known */
   double dent;            /* of rows of capsules or spheres */
@@ -85,17 +88,28 @@ static qmat_status keep_budget(work *w, double growth) {
   return qmat_shape_set_reduce(w->context, set);
 }
 
+/* Makes the spheres that shapes are made of: those of the medial mesh, divided where several joints move the surface.
+ */
+static qmat_status make_spheres(work *w, const qmat_mesh *mesh, const qmat_medial *medial, qmat_medial *unit) {
+  qmat_context *context = w->context;
+  qmat_status status = qmat_surface_new(context, mesh, &w->surface);
+  *unit = *medial;
+  if (status == QMAT_OK) status = qmat_unit_spheres(context, qmat_surface_frame(w->surface), medial, &unit->spheres);
+  if (status == QMAT_OK) status = qmat_joint_points_take(context, w->surface, &w->skin);
+  if (status != QMAT_OK || w->skin.joint_count < 2) return status;
+  const qmat_medial whole = *unit;
+  return qmat_joint_points_divide(context, &w->skin, &whole, unit, &w->joints);
+}
+
 static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial *medial) {
   const medial_colliders_params *p = w->params;
   qmat_context *context = w->context;
-  qmat_status status = qmat_surface_new(context, mesh, &w->surface);
-  if (status != QMAT_OK) return status;
-  qmat_medial unit = *medial;
-  status = qmat_unit_spheres(context, qmat_surface_frame(w->surface), medial, &unit.spheres);
+  qmat_medial unit;
+  qmat_status status = make_spheres(w, mesh, medial, &unit);
   if (status != QMAT_OK) return status;
   for (w->dent = p->dent; status == QMAT_OK; w->dent *= 1.25) {
     const bool may_deepen = kind_of(p) != QMAT_SHAPES_ANY && w->dent < deepest_dent;
-    status = qmat_shape_set_make(context, &unit, p->least_radius, kind_of(p), w->dent,
+    status = qmat_shape_set_make(context, &unit, w->joints, p->least_radius, kind_of(p), w->dent,
                                  may_deepen ? 4 * MOST_IN_ROWS : SIZE_MAX, &w->set);
     if (!may_deepen || w->set.shape_count <= MOST_IN_ROWS) break;
   }
@@ -105,7 +119,7 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
   /* The surface itself is known to the deviation. */
   const double deviation = mesh->deviation / qmat_surface_frame(w->surface)->diagonal;
   if (status == QMAT_OK && p->fit == FIT_CONTAIN) {
-    status = qmat_cover_fit(context, w->surface, &w->set, p->least_radius, &w->proved);
+    status = qmat_cover_fit(context, w->surface, &w->skin, &w->set, p->least_radius, &w->proved);
     for (size_t i = 0; i < w->set.sphere_count; i++) w->set.spheres[4 * i + 3] += deviation;
   }
   if (status == QMAT_OK && p->fit == FIT_INSIDE) {
@@ -142,6 +156,13 @@ static qmat_status fill_colliders(work *w) {
   c->shape_count = w->set.shape_count;
   qmat_frame_spheres_to_model(qmat_surface_frame(w->surface), w->set.spheres, c->sphere_count, c->spheres);
   memcpy(c->shapes, w->set.shapes, 3 * c->shape_count * sizeof *c->shapes);
+  if (w->skin.joint_count > 0) {
+    c->joints = qmat_alloc(c->shape_count, sizeof *c->joints);
+    if (!c->joints) return qmat_fail_memory(w->context, "the colliders");
+    c->joint_count = c->shape_count;
+    for (size_t i = 0; i < c->shape_count; i++)
+      c->joints[i] = w->set.joints ? w->set.joints[w->set.shapes[3 * i]] : w->skin.first_joint;
+  }
   c->body_count = qmat_rigid_body_of_surface(w->surface, w->params->density, c->body, &w->volume);
   const qmat_hull_side side = w->params->fit == FIT_CONTAIN ? QMAT_HULL_OUTSIDE : QMAT_HULL_INSIDE;
   const double error = w->params->hull_error * qmat_surface_frame(w->surface)->diagonal;
@@ -154,6 +175,7 @@ static qmat_status fill_colliders(work *w) {
 static qmat_status make_hulls_of_solid(work *w) {
   qmat_solid_part *parts = NULL;
   qmat_status status = qmat_solid_parts_find(w->context, w->surface, &w->set, w->params->least_radius, &parts);
+  if (status == QMAT_OK && w->set.joints) status = qmat_solid_parts_add_joints(w->context, &w->set, &w->skin, parts);
   if (status == QMAT_OK)
     status = qmat_hulls_merge(w->context, w->surface, parts, (size_t)w->params->shapes, (size_t)w->params->hull_points,
                               w->params->hull_error * qmat_surface_frame(w->surface)->diagonal, w->colliders);
@@ -164,6 +186,28 @@ static qmat_status make_hulls_of_solid(work *w) {
 
 static const char *const fits[] = {"both", "contain", "inside", NULL};
 static const char *const kinds[] = {"any", "capsules", "spheres", "hulls", NULL};
+
+/* The number of shapes of each joint that has some: {"joint": 3, "shapes": 2}. NULL: no memory. */
+static json_t *count_by_joint(const qmat_colliders *c) {
+  json_t *list = json_array();
+  uint32_t joint = 0;
+  for (bool more = list && c->joint_count > 0; more; joint++) {
+    size_t count = 0;
+    uint32_t next = UINT32_MAX;
+    for (size_t i = 0; i < c->joint_count; i++) {
+      count += c->joints[i] == joint;
+      if (c->joints[i] > joint && c->joints[i] < next) next = c->joints[i];
+    }
+    if (count > 0 && json_array_append_new(
+                         list, json_pack("{s:I, s:I}", "joint", (json_int_t)joint, "shapes", (json_int_t)count)) != 0) {
+      json_decref(list);
+      return NULL;
+    }
+    more = next != UINT32_MAX;
+    joint = next - 1;
+  }
+  return list;
+}
 
 static qmat_status make_report(const work *w, qmat_report *report) {
   const qmat_shape_measures *m = &w->measures;
@@ -197,6 +241,10 @@ static qmat_status make_report(const work *w, qmat_report *report) {
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
     bad |= json_object_set_new(report->root, numbers[i].key, json_real(numbers[i].value));
   if (has_hulls_of_solid(w)) bad |= json_object_set_new(report->root, "hull_protrusion", json_real(w->hull_protrusion));
+  if (w->colliders->joint_count > 0) {
+    bad |= json_object_set_new(report->root, "pose", json_string("bind"));
+    bad |= json_object_set_new(report->root, "joints", count_by_joint(w->colliders));
+  }
   if (w->colliders->body_count > 0) {
     const double *b = w->colliders->body;
     bad |= json_object_set_new(report->root, "mass", json_real(b[0]));
@@ -233,7 +281,8 @@ static const qmat_param params[] = {
               "both: the spheres as they are; contain: nothing of the solid is outside of the shapes; inside: nothing "
               "of a shape is outside of the solid"),
     QMAT_INT(medial_colliders_params, shapes, "shapes", 0, 0, 1e6,
-             "The largest number of shapes; pairs become one until it is reached; 0: any number"),
+             "The largest number of shapes, but one for each joint of a skin; pairs become one until it is reached; 0: "
+             "any number"),
     QMAT_ENUM(
         medial_colliders_params, kind, kinds, QMAT_SHAPES_ANY,
         "any: spheres, tapered capsules and hulls of three spheres; capsules: no hulls; spheres: spheres only; hulls: "
@@ -271,7 +320,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_colliders = {
     .name = "medial.colliders",
-    .version = 21,
+    .version = 22,
     .summary = "Makes colliders of a medial mesh: spheres, tapered capsules and hulls of three spheres",
     .doc =
         "A shape is a sphere, a cone (a tapered capsule) or a slab (the convex hull of three spheres) of the medial "
@@ -289,6 +338,12 @@ const qmat_node qmat_node_medial_colliders = {
         "solid, too: hull_protrusion in the report bounds by how much, to 1e-4 diagonals. Sheets are divided and "
         "joined likewise; their hulls reach beyond them by least_radius. Open surfaces, and sheets with a thickness, "
         "keep the hulls of the shapes.\n\n"
+        "A skinned mesh gets shapes for each joint: cones and slabs are divided where another joint moves the surface "
+        "around them, and only shapes of one joint are joined. With fit=contain a vertex is inside of a shape of the "
+        "joint with its largest weight (the lowest of equal ones). It also is in one of each joint with at least a "
+        "quarter of that weight, so that shapes overlap at joints. A joint without a vertex of its own has no shape. "
+        "That nothing of the solid is outside, and all measures, hold for the bind pose. The report counts the shapes "
+        "of each joint.\n\n"
         "Mass, centre and inertia are exact integrals over the solid; open surfaces have none. Mass is in kg, inertia "
         "in kg times the square of a model unit.\n\n"
         "The measures in the report are those of cuRobo, in diagonals, and sampled. coverage: the share of the solid's "

@@ -333,6 +333,7 @@ class Colliders(Value):
     report = None
     spheres = property(lambda self: self.arrays["spheres"])
     shapes = property(lambda self: self.arrays["shapes"])
+    joints = property(lambda self: self.arrays["joints"], doc="The joint that moves each shape; empty without a skin.")
 
     @property
     def hulls(self):

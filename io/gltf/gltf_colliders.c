@@ -284,11 +284,12 @@ bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_c
 
 /* ---- joints ---- */
 
-/* The joint that has most of the weight at the spheres of a shape. */
+/* The joint of a shape; where it has none, the one that has most of the weight at the spheres nearest to its own. */
 static uint32_t joint_of(const qmat_gltf_colliders *added, size_t shape, const qmat_medial *medial) {
   const qmat_colliders *c = added->colliders;
   uint32_t joints[12], best = 0;
   double weights[12], most = -1;
+  if (c->joint_count > 0) return c->joints[shape];
   for (size_t s = 0; s < 3; s++) {
     const double *sphere = &c->spheres[4 * (size_t)c->shapes[3 * shape + s]];
     double nearest = INFINITY;

@@ -42,11 +42,12 @@ void qmat_gltf_colliders_uninit(qmat_gltf_colliders *added);
  * colliders' space. False when out of memory. */
 bool qmat_gltf_colliders_attach(json_t *root, json_int_t node, const qmat_gltf_colliders *added, const double shift[3]);
 
-/* Makes the colliders of a skinned mesh follow its joints: each becomes a child of a node below the joint that moves
- * most of it, by the joints and weights of the spheres of `medial` (which has them, in the colliders' space) that are
- * nearest to its own. That node has the joint's inverse bind matrix (`matrices`, 16 numbers per joint by columns) and
- * is a kinematic body where `dynamic` is set. `node` carries the mesh; colliders of an earlier run leave it and the
- * joints. Joints that the skin does not have count as its first. False when out of memory. */
+/* Makes the colliders of a skinned mesh follow its joints: each becomes a child of a node below its joint. Colliders
+ * without joints take the one that moves most of them, by the joints and weights of the spheres of `medial` (which has
+ * them, in the colliders' space) that are nearest to their own. That node has the joint's inverse bind matrix
+ * (`matrices`, 16 numbers per joint by columns) and is a kinematic body where `dynamic` is set. `node` carries the
+ * mesh; colliders of an earlier run leave it and the joints. Joints that the skin does not have count as its first.
+ * False when out of memory. */
 bool qmat_gltf_colliders_attach_to_joints(json_t *root, json_int_t node, const qmat_gltf_colliders *added,
                                           const qmat_medial *medial, const double *matrices);
 

@@ -36,6 +36,8 @@ typedef struct fit {
   double least_radius;
   size_t sample_count, even_count; /* all samples; the first are spread evenly and count as slack */
   double *samples;                 /* 4 per sample: a point, and how far the solid reaches around it */
+  const qmat_joint_points *skin;   /* NULL: nothing is skinned */
+  uint32_t *joints;                /* per sample: only shapes of this joint count; NULL: all do */
   qmat_prepared_shape *shapes;     /* those of the set */
   row *rows;
   double *vectors; /* 6 vectors of 4 numbers per sphere, and those below */
@@ -44,7 +46,24 @@ typedef struct fit {
 
 /* ---- samples ---- */
 
+/* Those of joints. */
+static qmat_status take_skinned_samples(fit *t) {
+  const size_t count =
+      qmat_surface_mesh(t->surface)->vertex_count <= MOST_VERTICES ? t->skin->count : t->skin->even_count;
+  const size_t room = count + MOST_PARTS;
+  t->samples = qmat_arena_alloc(&t->context->arena, room, 4 * sizeof *t->samples);
+  t->rows = qmat_arena_alloc(&t->context->arena, room, sizeof *t->rows);
+  t->joints = qmat_arena_alloc(&t->context->arena, room, sizeof *t->joints);
+  if (!t->samples || !t->rows || !t->joints) return qmat_fail_memory(t->context, "samples of the surface");
+  memcpy(t->samples, t->skin->points, 4 * count * sizeof *t->samples);
+  memcpy(t->joints, t->skin->joints, count * sizeof *t->joints);
+  t->sample_count = count;
+  t->even_count = t->skin->even_count;
+  return QMAT_OK;
+}
+
 static qmat_status take_samples(fit *t) {
+  if (t->skin) return take_skinned_samples(t);
   qmat_context *context = t->context;
   const qmat_mesh *mesh = qmat_surface_mesh(t->surface);
   const double *positions = qmat_surface_positions(t->surface);
@@ -84,13 +103,40 @@ static qmat_status take_samples(fit *t) {
 
 /* ---- one step ---- */
 
+/* The shape of a joint that is nearest to a point, and its signed distance; INFINITY: the joint has none. */
+static double nearest_of_joint(const fit *t, uint32_t joint, const double point[3], size_t *nearest) {
+  const qmat_shape_set *set = t->set;
+  double least = INFINITY;
+  for (size_t i = 0; i < set->shape_count; i++) {
+    if (set->joints[set->shapes[3 * i]] != joint) continue;
+    const double distance = qmat_shape_distance(&t->shapes[i], point, NULL);
+    if (!(distance < least)) continue;
+    least = distance;
+    *nearest = i;
+  }
+  return least;
+}
+
+/* The same as qmat_envelope_nearest, among the shapes of a joint. */
+static double medial_of_joint(const fit *t, uint32_t joint, const double point[3], size_t *nearest, double medial[4]) {
+  const double distance = nearest_of_joint(t, joint, point, nearest);
+  const uint32_t *ids = &t->set->shapes[3 * *nearest];
+  double shares[3];
+  qmat_shape_distance(&t->shapes[*nearest], point, shares);
+  for (int k = 0; k < 4; k++) {
+    medial[k] = 0;
+    for (int s = 0; s < 3; s++) medial[k] += shares[s] * t->set->spheres[4 * (size_t)ids[s] + (size_t)k];
+  }
+  return distance;
+}
+
 /* Fills the rows. `*slack` becomes the mean of -F over the even samples, `*outside` the largest F. */
 static qmat_status evaluate(fit *t, double *slack, double *outside) {
   const qmat_shape_set *set = t->set;
   const int threads = qmat_threads(t->context);
   for (size_t i = 0; i < set->shape_count; i++) qmat_shape_prepare(&t->shapes[i], set->spheres, &set->shapes[3 * i]);
-  qmat_envelope *envelope;
-  const qmat_status status = qmat_shape_set_envelope(t->context, set, &envelope);
+  qmat_envelope *envelope = NULL;
+  const qmat_status status = t->joints ? QMAT_OK : qmat_shape_set_envelope(t->context, set, &envelope);
   if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
   for (size_t i = 0; i < t->sample_count; i++) {
@@ -98,7 +144,8 @@ static qmat_status evaluate(fit *t, double *slack, double *outside) {
     const double *point = &t->samples[4 * i];
     double medial[4];
     size_t primitive = 0;
-    r->f = qmat_envelope_nearest(envelope, point, &primitive, medial) + point[3];
+    r->f = point[3] + (t->joints ? medial_of_joint(t, t->joints[i], point, &primitive, medial)
+                                 : qmat_envelope_nearest(envelope, point, &primitive, medial));
     memcpy(r->ids, &set->shapes[3 * primitive], sizeof r->ids);
     qmat_shape_distance(&t->shapes[primitive], point, r->shares);
     const double away = qmat_point_distance(point, medial);
@@ -238,6 +285,20 @@ static void grow_parts(fit *t, const qmat_cover_bound *bound) {
   }
 }
 
+/* Grows shapes of joints that do not contain all points of theirs. */
+static void grow_joints(fit *t) {
+  for (size_t i = 0; i < t->set->shape_count; i++)
+    qmat_shape_prepare(&t->shapes[i], t->set->spheres, &t->set->shapes[3 * i]);
+  for (size_t i = 0; t->skin && i < t->skin->count; i++) {
+    const double *point = &t->skin->points[4 * i];
+    size_t nearest = 0;
+    const double left = nearest_of_joint(t, t->skin->joints[i], point, &nearest) + point[3] + 1e-6;
+    if (!(left > 0) || !isfinite(left)) continue;
+    grow_at(t->set, (uint32_t)nearest, point, left);
+    qmat_shape_prepare(&t->shapes[nearest], t->set->spheres, &t->set->shapes[3 * nearest]);
+  }
+}
+
 /* Fits the spheres, searches the solid, fits again with what was found among the samples, and at last grows shapes
  * until the whole solid is covered. */
 static qmat_status cover_solid(fit *t) {
@@ -261,6 +322,7 @@ static qmat_status cover_solid(fit *t) {
     }
     const size_t stride = 1 + ROUNDS * bound.count / MOST_PARTS; /* each round has its share of the room */
     for (size_t k = 0; k < bound.count && t->sample_count < room; k += stride) {
+      if (t->joints) t->joints[t->sample_count] = t->set->joints[t->set->shapes[3 * (size_t)bound.parts[k].shape]];
       double *sample = &t->samples[4 * t->sample_count++];
       memcpy(sample, bound.parts[k].point, sizeof bound.parts[k].point);
       sample[3] = bound.parts[k].reach;
@@ -276,29 +338,37 @@ static qmat_status cover_solid(fit *t) {
 /* Gives each shape spheres of its own, which can move apart. */
 static qmat_status unshare(qmat_context *context, qmat_shape_set *set) {
   double *spheres = qmat_arena_alloc(&context->arena, 3 * set->shape_count, 4 * sizeof *spheres);
-  if (!spheres) return qmat_fail_memory(context, "the fitted colliders");
+  uint32_t *joints = set->joints ? qmat_arena_alloc(&context->arena, 3 * set->shape_count, sizeof *joints) : NULL;
+  if (!spheres || (set->joints && !joints)) return qmat_fail_memory(context, "the fitted colliders");
   size_t count = 0;
   for (size_t i = 0; i < set->shape_count; i++) {
     uint32_t *ids = &set->shapes[3 * i];
     const int width = qmat_shape_width(ids);
     for (int k = 0; k < width; k++) {
       memcpy(&spheres[4 * count], &set->spheres[4 * (size_t)ids[k]], 4 * sizeof *spheres);
+      if (joints) joints[count] = set->joints[ids[k]];
       ids[k] = (uint32_t)count++;
     }
     for (int k = width; k < 3; k++) ids[k] = ids[width - 1];
   }
   set->spheres = spheres;
   set->sphere_count = count;
+  set->joints = joints;
   return QMAT_OK;
 }
 
-qmat_status qmat_cover_fit(qmat_context *context, const qmat_surface *surface, qmat_shape_set *set, double least_radius,
-                           bool *proved) {
-  fit t = {.context = context, .surface = surface, .set = set, .least_radius = least_radius};
+qmat_status qmat_cover_fit(qmat_context *context, const qmat_surface *surface, const qmat_joint_points *skin,
+                           qmat_shape_set *set, double least_radius, bool *proved) {
+  fit t = {.context = context,
+           .surface = surface,
+           .set = set,
+           .skin = set->joints ? skin : NULL,
+           .least_radius = least_radius};
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   *proved = mesh->closed && mesh->oriented;
   qmat_status status = unshare(context, set);
   if (status == QMAT_OK) status = take_samples(&t);
   if (status == QMAT_OK) status = cover_solid(&t);
+  if (status == QMAT_OK) grow_joints(&t);
   return status == QMAT_OK ? qmat_shape_set_reduce(context, set) : status;
 }

@@ -189,6 +189,12 @@ static bool are_near(const hull *a, const hull *b) {
   return true;
 }
 
+/* The joint that a member moves with. */
+static uint32_t joint_of(const exchange *x, size_t i) {
+  const qmat_hull_pieces *pieces = &x->members[i].all.pieces;
+  return pieces->count > 0 ? x->parts[pieces->pieces[0].part].joint : 0;
+}
+
 /* The points of a joint hull: those of the one, then those of the other. The caller frees them; NULL: no memory. */
 static double *joint_points(const exchange *x, const pair *p) {
   const hull *a = &x->members[p->a].all, *b = &x->members[p->b].all;
@@ -237,7 +243,8 @@ static qmat_status add_pairs(exchange *x, size_t first) {
   bool done = true;
   for (size_t b = first; b < x->count; b++)
     for (size_t a = 0; a < b; a++) {
-      if (!x->members[a].live || !x->members[b].live || !are_near(&x->members[a].all, &x->members[b].all)) continue;
+      if (!x->members[a].live || !x->members[b].live || joint_of(x, a) != joint_of(x, b)) continue;
+      if (!are_near(&x->members[a].all, &x->members[b].all)) continue;
       if (qmat_grow((void **)&x->pairs, &x->pair_capacity, x->pair_count + 1, sizeof *x->pairs) != 0)
         return qmat_fail_memory(x->context, "pairs of hulls");
       x->pairs[x->pair_count++] = (pair){.a = (uint32_t)a, .b = (uint32_t)b};

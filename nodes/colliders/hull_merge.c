@@ -117,7 +117,8 @@ static bool is_near(const merging *m, const part *a, const part *b) {
 }
 
 static qmat_status add_pair(merging *m, size_t a, size_t b) {
-  if (!m->parts[b].live || !is_near(m, &m->parts[a], &m->parts[b])) return QMAT_OK;
+  if (!m->parts[b].live || m->given[a].joint != m->given[b].joint || !is_near(m, &m->parts[a], &m->parts[b]))
+    return QMAT_OK;
   if (qmat_grow((void **)&m->pairs, &m->pair_capacity, m->pair_count + 1, sizeof *m->pairs))
     return qmat_fail_memory(m->context, "pairs of hulls");
   m->pairs[m->pair_count++] = (pair){(uint32_t)(a < b ? a : b), (uint32_t)(a < b ? b : a), 0, 0, true};
@@ -249,12 +250,12 @@ static qmat_status make_part(const merging *m, const qmat_solid_part *given, boo
   return QMAT_OK;
 }
 
-/* The live part with the point nearest to the first one of another part. */
+/* The live part of its joint with the point nearest to the first one of another part; itself where there is none. */
 static size_t nearest_part(const merging *m, const qmat_solid_part *given, size_t of) {
   size_t best = of;
   double least = INFINITY;
   for (size_t i = 0; i < m->part_count; i++)
-    for (size_t k = 0; m->parts[i].live && k < given[i].count; k++) {
+    for (size_t k = 0; m->parts[i].live && given[i].joint == given[of].joint && k < given[i].count; k++) {
       const double distance = qmat_point_distance(&given[i].points[3 * k], given[of].points);
       if (!(distance < least)) continue;
       least = distance;
@@ -266,6 +267,10 @@ static size_t nearest_part(const merging *m, const qmat_solid_part *given, size_
 /* Gives the points of a part without a hull to the nearest one that has. */
 static qmat_status move_part(merging *m, qmat_solid_part *given, size_t from) {
   qmat_solid_part *to = &given[nearest_part(m, given, from)];
+  if (to == &given[from]) { /* the joint has no other one: a box around it */
+    m->live_count++;
+    return make_part(m, to, true, &m->joints[0], &m->parts[from]);
+  }
   double *points = qmat_alloc(to->count + given[from].count, 3 * sizeof *points);
   if (!points) return QMAT_ERROR_MEMORY;
   memcpy(points, to->points, 3 * to->count * sizeof *points);
@@ -424,7 +429,8 @@ static qmat_status write_hulls(merging *m, qmat_colliders *c) {
   double *points = qmat_alloc(room, 3 * sizeof *points);
   uint32_t *triangles = qmat_alloc(room, 6 * sizeof *triangles);
   uint32_t *shapes = qmat_alloc(m->live_count, 3 * sizeof *shapes);
-  if (!points || !triangles || !shapes) status = QMAT_ERROR_MEMORY;
+  uint32_t *joints = c->joint_count > 0 ? qmat_alloc(m->live_count, sizeof *joints) : NULL;
+  if (!points || !triangles || !shapes || (c->joint_count > 0 && !joints)) status = QMAT_ERROR_MEMORY;
   size_t count = 0, point_count = 0, triangle_count = 0;
   for (size_t i = 0; i < m->live_count && status == QMAT_OK; i++) {
     const part *p = &m->ends[i];
@@ -434,6 +440,7 @@ static qmat_status write_hulls(merging *m, qmat_colliders *c) {
     memcpy(&points[3 * point_count], p->points, 3 * p->count * sizeof *points);
     for (size_t k = 0; k < 3 * of_hull; k++) triangles[3 * triangle_count + k] += (uint32_t)point_count;
     memcpy(&shapes[3 * count], &c->shapes[3 * (size_t)m->hulls[i].shape], 3 * sizeof *shapes);
+    if (joints) joints[count] = c->joints[m->hulls[i].shape];
     c->hull_ends[2 * count] = (uint32_t)(point_count += p->count);
     c->hull_ends[2 * count++ + 1] = (uint32_t)(triangle_count += of_hull);
   }
@@ -443,6 +450,11 @@ static qmat_status write_hulls(merging *m, qmat_colliders *c) {
     c->points = points, points = old_points;
     c->triangles = triangles, triangles = old_triangles;
     c->shapes = shapes, shapes = old_shapes;
+    if (joints) {
+      uint32_t *old_joints = c->joints;
+      c->joints = joints, joints = old_joints;
+      c->joint_count = count;
+    }
     c->shape_count = count;
     c->point_count = point_count;
     c->triangle_count = triangle_count;
@@ -450,6 +462,7 @@ static qmat_status write_hulls(merging *m, qmat_colliders *c) {
   qmat_free(points);
   qmat_free(triangles);
   qmat_free(shapes);
+  qmat_free(joints);
   return fail(m, status);
 }
 

@@ -12,7 +12,8 @@
  * where such facets may leave the solid by twice as much. A hull has at most `most_points` vertices, and is within a
  * fifth of `error` of the points of its parts where that allows it; the mesh's deviation is added. Of the hulls of
  * outer_hull.h and tangent_hull.h it is the one with the smaller volume. A joint hull keeps the three spheres of the
- * larger of the two. A part without a volume joins the nearest one.
+ * larger of the two. A part without a volume joins the nearest one. Only parts of one joint are joined; a joint all of
+ * whose parts are without a volume gets a box.
  *
  * `colliders` has the hulls of qmat_shape_hulls, outside, in units of the model. They are replaced, unless no part has
  * a volume. `parts`: those of qmat_solid_parts_find for its shapes, with the same demands on `solid`; their points may

@@ -81,7 +81,7 @@ static void find_partner(const qmat_shape_set *set, size_t a, qmat_shape_kind ki
   *partner = a;
   for (int pass = 0; pass < 2 && !isfinite(*cost); pass++)
     for (size_t b = a + 1; b < set->shape_count; b++) {
-      if (pass == 0 && apart(set, a, b) > 0) continue;
+      if (!qmat_shape_set_same_joint(set, a, b) || (pass == 0 && apart(set, a, b) > 0)) continue;
       pair p;
       join(set, a, b, kind, growth, &p);
       const double grown = p.volume - qmat_shape_volume(set->spheres, &set->shapes[3 * a]) -
@@ -95,8 +95,10 @@ static void find_partner(const qmat_shape_set *set, size_t a, qmat_shape_kind ki
 
 /* Replaces shapes a and b by their joint shape, in the place of a; the last shape moves to the place of b. */
 static void replace(qmat_shape_set *set, size_t a, size_t b, const pair *p) {
+  const uint32_t joint = set->joints ? set->joints[set->shapes[3 * a]] : 0;
   for (int k = 0; k < 3; k++) {
     memcpy(&set->spheres[4 * (set->sphere_count + (size_t)k)], p->best[k], sizeof p->best[k]);
+    if (set->joints) set->joints[set->sphere_count + (size_t)k] = joint;
     set->shapes[3 * a + (size_t)k] = (uint32_t)(set->sphere_count + p->ids[k]);
   }
   set->sphere_count += 3;
@@ -115,6 +117,11 @@ qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qma
   if (!spheres || !costs || !partners) return qmat_fail_memory(context, "the colliders");
   memcpy(spheres, set->spheres, 4 * set->sphere_count * sizeof *spheres);
   set->spheres = spheres;
+  if (set->joints) {
+    uint32_t *joints = qmat_arena_alloc(&context->arena, room, sizeof *joints);
+    if (!joints) return qmat_fail_memory(context, "the colliders");
+    set->joints = memcpy(joints, set->joints, set->sphere_count * sizeof *joints);
+  }
   for (size_t i = 0; i < given; i++) costs[i] = NAN; /* not known */
   while (set->shape_count > most) {
     size_t best = 0;
@@ -126,6 +133,7 @@ qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qma
       }
       if (costs[i] < costs[best]) best = i;
     }
+    if (isinf(costs[best])) break;
     const size_t a = best, b = partners[best], last = set->shape_count - 1;
     pair p;
     join(set, a, b, kind, growth, &p);

@@ -59,12 +59,18 @@ double qmat_shape_volume(const double *spheres, const uint32_t ids[3]) {
   return 2 * area * r + 0.5 * QMAT_PI * r * r * border + 4 / 3.0 * QMAT_PI * r * r * r;
 }
 
+bool qmat_shape_set_same_joint(const qmat_shape_set *set, size_t a, size_t b) {
+  return !set->joints || set->joints[set->shapes[3 * a]] == set->joints[set->shapes[3 * b]];
+}
+
 /* ---- a growing set ---- */
 
 typedef struct builder {
   qmat_context *context;
   qmat_shape_set set;
   size_t sphere_room, shape_room;
+  bool has_joints;
+  uint32_t joint; /* of the spheres that are added */
   bool failed;
 } builder;
 
@@ -78,6 +84,12 @@ static void *grown(builder *b, const void *array, size_t count, size_t *room, si
 }
 
 static uint32_t add_sphere(builder *b, const double sphere[4]) {
+  size_t of_joints = b->sphere_room;
+  if (b->has_joints) {
+    b->set.joints = grown(b, b->set.joints, b->set.sphere_count, &of_joints, sizeof *b->set.joints);
+    b->failed = b->failed || !b->set.joints;
+    if (!b->failed) b->set.joints[b->set.sphere_count] = b->joint;
+  }
   double *spheres = grown(b, b->set.spheres, b->set.sphere_count, &b->sphere_room, 4 * sizeof *spheres);
   b->failed = b->failed || !spheres;
   if (b->failed) return 0;
@@ -226,19 +238,23 @@ static qmat_status mark_nested(qmat_context *context, const qmat_shape_set *set,
     const qmat_status status = qmat_progress(context, set->shape_count - i, set->shape_count, "shapes compared");
     if (status != QMAT_OK) return status;
     for (size_t j = 0; j < set->shape_count && !dropped[i]; j++)
-      if (j != i && !dropped[j] && holds(&prepared[j], set->spheres, ids)) dropped[i] = 1;
+      if (j != i && !dropped[j] && qmat_shape_set_same_joint(set, i, j) && holds(&prepared[j], set->spheres, ids))
+        dropped[i] = 1;
   }
   return QMAT_OK;
 }
 
 qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set) {
-  builder b = {.context = context, .set = {.sphere_count = set->sphere_count, .spheres = set->spheres}};
+  builder b = {.context = context,
+               .set = {.sphere_count = set->sphere_count, .spheres = set->spheres, .joints = set->joints}};
   for (size_t i = 0; i < set->shape_count; i++) add_reduced(&b, &set->shapes[3 * i]);
   const size_t count = b.set.shape_count;
   uint8_t *dropped = qmat_arena_calloc(&context->arena, count, 1);
   uint32_t *names = qmat_arena_alloc(&context->arena, set->sphere_count, sizeof *names);
   double *spheres = qmat_arena_alloc(&context->arena, set->sphere_count, 4 * sizeof *spheres);
-  if (b.failed || !dropped || !names || !spheres) return qmat_fail_memory(context, "the colliders");
+  uint32_t *joints = set->joints ? qmat_arena_alloc(&context->arena, set->sphere_count, sizeof *joints) : NULL;
+  if (b.failed || !dropped || !names || !spheres || (set->joints && !joints))
+    return qmat_fail_memory(context, "the colliders");
   if (count > 0) qsort(b.set.shapes, count, 3 * sizeof *b.set.shapes, compare_shapes);
   const qmat_status status = mark_nested(context, &b.set, dropped);
   if (status != QMAT_OK) return status;
@@ -252,10 +268,12 @@ qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set) {
   for (size_t i = 0; i < set->sphere_count; i++) {
     if (names[i] != 0) continue;
     memcpy(&spheres[4 * used], &set->spheres[4 * i], 4 * sizeof *spheres);
+    if (joints) joints[used] = set->joints[i];
     names[i] = (uint32_t)used++;
   }
   for (size_t i = 0; i < 3 * kept; i++) b.set.shapes[i] = names[b.set.shapes[i]];
-  *set = (qmat_shape_set){.sphere_count = used, .shape_count = kept, .spheres = spheres, .shapes = b.set.shapes};
+  *set = (qmat_shape_set){
+      .sphere_count = used, .shape_count = kept, .spheres = spheres, .shapes = b.set.shapes, .joints = joints};
   return QMAT_OK;
 }
 
@@ -263,6 +281,7 @@ qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set) {
 
 static void add_simplex(builder *b, uint32_t x, uint32_t y, uint32_t z, qmat_shape_kind kind, double dent) {
   const uint32_t ids[3] = {x, y, z};
+  if (b->has_joints) b->joint = b->set.joints[x];
   const int width = qmat_shape_width(ids);
   if (kind == QMAT_SHAPES_ANY || width == 1 || (kind == QMAT_SHAPES_CAPSULES && width == 2)) {
     add_shape(b, x, y, z);
@@ -275,15 +294,17 @@ static void add_simplex(builder *b, uint32_t x, uint32_t y, uint32_t z, qmat_sha
   }
 }
 
-qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, double least_radius,
-                                qmat_shape_kind kind, double dent, size_t most, qmat_shape_set *set) {
-  builder b = {.context = context};
+qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, const uint32_t *joints,
+                                double least_radius, qmat_shape_kind kind, double dent, size_t most,
+                                qmat_shape_set *set) {
+  builder b = {.context = context, .has_joints = joints};
   uint8_t *used = qmat_arena_calloc(&context->arena, unit->sphere_count, 1);
   b.failed = !used;
   for (size_t i = 0; i < unit->sphere_count && !b.failed; i++) {
     double sphere[4];
     memcpy(sphere, &unit->spheres[4 * i], sizeof sphere);
     sphere[3] = fmax(sphere[3], least_radius);
+    if (joints) b.joint = joints[i];
     add_sphere(&b, sphere);
   }
   for (size_t i = 0; i < unit->triangle_count && !b.failed; i++) {

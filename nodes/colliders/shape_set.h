@@ -13,6 +13,7 @@ typedef struct qmat_shape_set {
   size_t sphere_count, shape_count;
   double *spheres;  /* 4 per sphere */
   uint32_t *shapes; /* 3 per shape, as in qmat_colliders */
+  uint32_t *joints; /* per sphere; those of a shape have the same; NULL: nothing is skinned */
 } qmat_shape_set;
 
 typedef enum qmat_shape_kind { QMAT_SHAPES_ANY, QMAT_SHAPES_CAPSULES, QMAT_SHAPES_SPHERES } qmat_shape_kind;
@@ -35,24 +36,29 @@ void qmat_shape_prepare(qmat_prepared_shape *shape, const double *spheres, const
  * (may be NULL) receives the shares of its spheres at the medial point that attains it. */
 double qmat_shape_distance(const qmat_prepared_shape *shape, const double point[3], double weights[3]);
 
+/* Whether two shapes move with the same joint. */
+bool qmat_shape_set_same_joint(const qmat_shape_set *set, size_t a, size_t b);
+
 /* The volume of a shape; of three spheres it is that of spheres with their mean radius. */
 double qmat_shape_volume(const double *spheres, const uint32_t ids[3]);
 
 /* Makes the shapes of a medial mesh: its maximal simplices. Radii below `least_radius` (above 0) become that. A simplex
  * whose spheres contain each other becomes those that count, and a shape inside another one is left out. With `kind`,
  * slabs and cones become rows of capsules or spheres; the dents between them are at most `dent` deep. Of more than
- * `most` shapes none is left out, which saves time: the caller tries again with deeper dents.
+ * `most` shapes none is left out, which saves time: the caller tries again with deeper dents. `joints` (may be NULL)
+ * are those of the spheres; only what is inside a shape of the same joint is left out, here and below.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: quadratic in the shapes. */
-qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, double least_radius,
-                                qmat_shape_kind kind, double dent, size_t most, qmat_shape_set *set);
+qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, const uint32_t *joints,
+                                double least_radius, qmat_shape_kind kind, double dent, size_t most,
+                                qmat_shape_set *set);
 
 /* Leaves out what changed spheres have made redundant: simplices whose spheres contain each other, shapes inside
  * others, unused spheres. Errors and cost as above. */
 qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set);
 
-/* Joins pairs of shapes, the least growth of volume first, until at most `most` are left. A joint shape is the hull of
- * some of their spheres; `growth` times what the others leave it by is added to its radii, so that 1 makes it contain
- * both. Errors as above. */
+/* Joins pairs of shapes, the least growth of volume first, until at most `most` are left, or none has another one
+ * of its joint. The shape for both is the hull of some of their spheres; `growth` times what the others leave it by is
+ * added to its radii, so that 1 makes it contain both. Errors as above. */
 qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qmat_shape_kind kind, double growth,
                                  size_t most);
 

@@ -2,6 +2,7 @@
 #include "nodes/colliders/solid_parts.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/geometry/sheets.h"
@@ -213,9 +214,94 @@ qmat_status qmat_solid_parts_find(qmat_context *context, const qmat_surface *sur
   for (size_t i = 0; i < count; i++) {
     heap *h = &all.heaps[i];
     if (done && qmat_extreme_points_keep(h->hull.points, &h->hull.count, qmat_solid_dropped) != QMAT_OK) done = false;
-    (*parts)[i] = (qmat_solid_part){h->hull.count, h->cell_count, h->hull.points, h->cells, h->cell_points};
+    (*parts)[i] = (qmat_solid_part){h->hull.count, h->cell_count, h->hull.points, h->cells, h->cell_points, 0};
   }
   return status != QMAT_OK || done ? status : qmat_fail_memory(context, "the parts of the solid");
+}
+
+/* A point of a joint, and the shape and the cell that it goes to. */
+typedef struct given_point {
+  double at[3];
+  uint32_t shape; /* UINT32_MAX: the joint has none */
+  uint8_t cell[3];
+} given_point;
+
+static int compare_points(const void *left, const void *right) {
+  const given_point *a = left, *b = right;
+  if (a->shape != b->shape) return a->shape < b->shape ? -1 : 1;
+  const int order = memcmp(a->cell, b->cell, sizeof a->cell);
+  return order != 0 ? order : memcmp(a->at, b->at, sizeof a->at);
+}
+
+static void place_point(const qmat_shape_set *set, const qmat_prepared_shape *shapes, const double *point,
+                        uint32_t joint, given_point *given) {
+  double least = INFINITY;
+  memcpy(given->at, point, sizeof given->at);
+  given->shape = UINT32_MAX;
+  for (int k = 0; k < 3; k++)
+    given->cell[k] = (uint8_t)fmin(fmax((point[k] + 0.5) * QMAT_SOLID_CELLS, 0), QMAT_SOLID_CELLS - 1);
+  for (size_t i = 0; i < set->shape_count; i++) {
+    if (set->joints[set->shapes[3 * i]] != joint) continue;
+    const double distance = qmat_shape_distance(&shapes[i], point, NULL);
+    if (!(distance < least)) continue;
+    least = distance;
+    given->shape = (uint32_t)i;
+  }
+}
+
+/* Adds the points of one cell, as a further cell. */
+static bool add_given(heap *h, const given_point *given, size_t count) {
+  qmat_solid_cell cell = {.count = (uint32_t)count, .first = (uint32_t)count};
+  memcpy(cell.at, given->cell, sizeof cell.at);
+  for (size_t i = 0; i < count; i++)
+    if (!qmat_point_heap_add(&h->hull, given[i].at, 1, qmat_solid_dropped) || !add_cells(h, NULL, 0, given[i].at, 1))
+      return false;
+  return add_cells(h, &cell, 1, NULL, 0);
+}
+
+/* Adds points to a part, which come cell by cell. */
+static bool add_to_part(qmat_solid_part *part, const given_point *given, size_t count) {
+  size_t before = 0;
+  for (size_t c = 0; c < part->cell_count; c++) before += part->cells[c].count;
+  heap h = {.hull = {.count = part->count, .capacity = 3 * part->count, .points = part->points},
+            .cell_count = part->cell_count,
+            .cell_capacity = part->cell_count,
+            .point_count = before,
+            .point_capacity = 3 * before,
+            .cells = part->cells,
+            .cell_points = part->cell_points};
+  bool done = true;
+  for (size_t i = 0, end; i < count && done; i = end) {
+    for (end = i; end < count && memcmp(given[end].cell, given[i].cell, sizeof given->cell) == 0;) end++;
+    done = add_given(&h, &given[i], end - i);
+  }
+  done = done && qmat_extreme_points_keep(h.hull.points, &h.hull.count, qmat_solid_dropped) == QMAT_OK;
+  *part = (qmat_solid_part){h.hull.count, h.cell_count, h.hull.points, h.cells, h.cell_points, part->joint};
+  return done;
+}
+
+qmat_status qmat_solid_parts_add_joints(qmat_context *context, const qmat_shape_set *set,
+                                        const qmat_joint_points *points, qmat_solid_part *parts) {
+  const size_t count = points->count;
+  given_point *given = qmat_arena_calloc(&context->arena, count, sizeof *given);
+  qmat_prepared_shape *shapes = qmat_arena_alloc(&context->arena, set->shape_count, sizeof *shapes);
+  if (!given || !shapes) return qmat_fail_memory(context, "the parts of the solid");
+  for (size_t i = 0; i < set->shape_count; i++) {
+    qmat_shape_prepare(&shapes[i], set->spheres, &set->shapes[3 * i]);
+    parts[i].joint = set->joints[set->shapes[3 * i]];
+  }
+  for (size_t i = 0; i < count; i++) {
+    const qmat_status status = i % 1024 ? QMAT_OK : qmat_progress(context, i, count, "points");
+    if (status != QMAT_OK) return status;
+    place_point(set, shapes, &points->points[4 * i], points->joints[i], &given[i]);
+  }
+  qsort(given, count, sizeof *given, compare_points);
+  bool done = true;
+  for (size_t i = 0, end; i < count && given[i].shape != UINT32_MAX && done; i = end) {
+    for (end = i; end < count && given[end].shape == given[i].shape;) end++;
+    done = add_to_part(&parts[given[i].shape], &given[i], end - i);
+  }
+  return done ? QMAT_OK : qmat_fail_memory(context, "the parts of the solid");
 }
 
 void qmat_solid_parts_free(qmat_solid_part *parts, size_t count) {

@@ -3,6 +3,7 @@
 #define QMAT_NODES_COLLIDERS_SOLID_PARTS_H
 
 #include "core/geometry/surface.h"
+#include "nodes/colliders/joint_points.h"
 #include "nodes/colliders/shape_set.h"
 
 /* Cells along an axis of the unit frame's box. */
@@ -23,6 +24,7 @@ typedef struct qmat_solid_part {
   double *points;         /* 3 each, in the unit frame; owned; NULL for none */
   qmat_solid_cell *cells; /* owned; NULL for none */
   double *cell_points;    /* those of all cells, one cell after the other; owned; NULL for none */
+  uint32_t joint;         /* that the part moves with; 0 where nothing is skinned */
 } qmat_solid_part;
 
 /* Divides a solid among shapes: each point belongs to the shape that is nearest to the centre of a cube around the
@@ -40,6 +42,12 @@ typedef struct qmat_solid_part {
  * and in the area between the parts. */
 qmat_status qmat_solid_parts_find(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
                                   double sheet_reach, qmat_solid_part **parts);
+
+/* Gives the parts of a skinned solid the joints of their shapes, and each point of a joint to the part of the joint's
+ * nearest shape. The hulls of a joint's parts then contain all of its points. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One
+ * thread. Cost: the points times the shapes. */
+qmat_status qmat_solid_parts_add_joints(qmat_context *context, const qmat_shape_set *set,
+                                        const qmat_joint_points *points, qmat_solid_part *parts);
 
 /* Frees the points and cells of `count` parts. NULL is allowed. */
 void qmat_solid_parts_free(qmat_solid_part *parts, size_t count);

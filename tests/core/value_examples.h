@@ -174,7 +174,7 @@ static inline qmat_list *list_example(void) {
   return list;
 }
 
-/* A capsule with a hull of a tetrahedron, and its mass properties. */
+/* A capsule with a hull of a tetrahedron, its joint, and its mass properties. */
 static inline qmat_colliders *colliders_example(void) {
   qmat_colliders *colliders = qmat_colliders_new();
   assert_non_null(colliders);
@@ -188,6 +188,8 @@ static inline qmat_colliders *colliders_example(void) {
   ASSIGN(colliders->points, (double[]){0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1});
   ASSIGN(colliders->triangles, (uint32_t[]){0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3});
   ASSIGN(colliders->hull_ends, (uint32_t[]){4, 4});
+  ASSIGN(colliders->joints, (uint32_t[]){3});
+  colliders->joint_count = 1;
   ASSIGN(colliders->body, (double[]){5, 0.5, 0, 0, 1, 2, 3, 0, 0, 0});
   return colliders;
 }
@@ -331,6 +333,9 @@ static inline qmat_colliders *bodiless_colliders_example(void) {
   qmat_free(colliders->hull_ends);
   qmat_free(colliders->body);
   colliders->body = NULL;
+  qmat_free(colliders->joints);
+  colliders->joints = NULL;
+  colliders->joint_count = 0;
   ASSIGN(colliders->shapes, (uint32_t[]){0, 0, 0, 1, 1, 1});
   ASSIGN(colliders->points, (double[]){0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 2, 2, 2});
   ASSIGN(colliders->hull_ends, (uint32_t[]){4, 4, 5, 4});

@@ -67,7 +67,7 @@ static void assert_not_sealed(qmat_value *value, qmat_status expected, const cha
   qmat_value_release(value);
 }
 
-static void test_colliders_without_radius_or_with_another_hulls_points_are_refused(void **state) {
+static void test_colliders_without_radius_or_with_another_hulls_points_or_joints_are_refused(void **state) {
   (void)state;
   qmat_colliders *colliders = colliders_example();
   colliders->spheres[7] = 0;
@@ -83,6 +83,11 @@ static void test_colliders_without_radius_or_with_another_hulls_points_are_refus
   colliders = colliders_example();
   colliders->hull_ends[1] = 3;
   assert_not_sealed(&colliders->base, QMAT_ERROR_GEOMETRY, "points or triangles follow the last hull");
+  colliders = colliders_example();
+  qmat_free(colliders->joints);
+  ASSIGN(colliders->joints, (uint32_t[]){3, 4});
+  colliders->joint_count = 2;
+  assert_not_sealed(&colliders->base, QMAT_ERROR_GEOMETRY, "2 joints for 1 shapes");
 }
 
 static void test_types_have_names(void **state) {
@@ -143,7 +148,7 @@ static void test_bytes_count_what_the_arrays_hold(void **state) {
                              "\"steps\":[1,2.0,\"a\\\"b\"]}"),
       [QMAT_FILE] = 4 + 8,
       [QMAT_FAILURE] = 10,
-      [QMAT_COLLIDERS] = 8 * 8 + 3 * 4 + 12 * 8 + 12 * 4 + 2 * 4 + 10 * 8,
+      [QMAT_COLLIDERS] = 8 * 8 + 3 * 4 + 12 * 8 + 12 * 4 + 2 * 4 + 10 * 8 + 4,
       [QMAT_LIST] = 2 * (3 * 8 + 10),
       [EXAMPLE_WHOLE_SCENE] = 6 + 3 + 8 + 2 * 4 + 4 + 4 + 16 * 8 + 32 * 8 + 2 * 4 + 2 * 4 + 20 * 8 + 2 * 4 + 2 * 4 +
                               3 * 4 + 48 * 8 + 4 + 6 * 4 + 3 * 8 + 2 * 4 + 10 * 8,
@@ -1067,7 +1072,7 @@ static void test_a_failure_has_the_error_without_its_place(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_types_have_names),
-      cmocka_unit_test(test_colliders_without_radius_or_with_another_hulls_points_are_refused),
+      cmocka_unit_test(test_colliders_without_radius_or_with_another_hulls_points_or_joints_are_refused),
       cmocka_unit_test(test_new_values_are_empty_and_can_be_released_at_once),
       cmocka_unit_test(test_half_filled_values_are_released_whole),
       cmocka_unit_test(test_bytes_count_what_the_arrays_hold),

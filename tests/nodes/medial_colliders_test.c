@@ -220,7 +220,7 @@ static result make_of_model(const char *name, const char *params) {
 
 static qmat_envelope *envelope_of(const qmat_colliders *c) {
   qmat_context context = {0};
-  const qmat_shape_set set = {c->sphere_count, c->shape_count, c->spheres, c->shapes};
+  const qmat_shape_set set = {c->sphere_count, c->shape_count, c->spheres, c->shapes, NULL};
   qmat_envelope *envelope;
   assert_int_equal(qmat_shape_set_envelope(&context, &set, &envelope), QMAT_OK);
   qmat_context_uninit(&context);

@@ -106,8 +106,9 @@ static void write_arm(const char *path) {
   qmat_writer_uninit(&data);
 }
 
-/* Describes the arm at 2 % and writes it, with colliders where their parameters are given; `*colliders` gets them. */
-static qmat_value *write_described(const char *params, const char *write_params, qmat_value **colliders) {
+/* Describes the arm at 2 % and writes it, with colliders where their parameters are given; `*colliders` gets them.
+ * `swapped`: they say that they are those of the other joint. */
+static qmat_value *write_described(const char *params, const char *write_params, bool swapped, qmat_value **colliders) {
   char folder[64], path[96], setting[128];
   make_folder(folder);
   snprintf(path, sizeof path, "%s/arm.glb", folder);
@@ -134,6 +135,8 @@ static qmat_value *write_described(const char *params, const char *write_params,
     pipeline_must_run(1, "medial.colliders", params, (const qmat_value *[]){solid[0], simple[0]}, shapes);
     inputs[qmat_input_find(write, "colliders")] = *colliders = shapes[0];
     qmat_value_release(shapes[1]);
+    qmat_colliders *made = (qmat_colliders *)shapes[0];
+    for (size_t i = 0; i < made->joint_count && swapped; i++) made->joints[i] = 1 - made->joints[i];
   }
   pipeline_must_run(1, "scene.write", write_params, inputs, written);
   qmat_value_release(written[1]);
@@ -146,7 +149,7 @@ static qmat_value *write_described(const char *params, const char *write_params,
 
 /* What the written file says of the arm's spheres. */
 static void describe_arm(qmr_medial *medial) {
-  qmat_value *written = write_described(NULL, "format=glb", NULL);
+  qmat_value *written = write_described(NULL, "format=glb", false, NULL);
   const qmat_file *file = (const qmat_file *)written;
   size_t length = 0;
   const char *text = qmr_find(file->parts[0].bytes, file->parts[0].size, NULL, &length);
@@ -194,15 +197,19 @@ static double number_at(const json_t *array, size_t i) {
 
 /* Each collider is below the joint that moves its part of the arm: when joint 1 turns by 90 degrees about its own z
  * axis, the matrices of the file take the colliders of the lower arm with it, and those of the upper arm stay. */
-static void colliders_must_follow(const char *write_params) {
-  qmat_value *colliders, *written = write_described("fit=contain kind=capsules", write_params, &colliders);
+static void colliders_must_follow(const char *write_params, bool swapped) {
+  qmat_value *colliders, *written = write_described("fit=contain kind=capsules", write_params, swapped, &colliders);
   const qmat_file *file = (const qmat_file *)written;
   qmat_context context = {0};
   qmat_gltf_asset asset;
   assert_int_equal(qmat_gltf_asset_init(&context, file->parts[0].bytes, file->parts[0].size, "arm", &asset), QMAT_OK);
   const json_t *nodes = json_object_get(asset.root, "nodes");
+  const qmat_colliders *made = (const qmat_colliders *)colliders;
   size_t count = 0, left = 0, right = 0;
+  assert_int_equal(made->joint_count, made->shape_count);
   for (size_t joint = 0; joint < 2; joint++) {
+    size_t of_joint = 0, before = count;
+    for (size_t i = 0; i < made->joint_count; i++) of_joint += made->joints[i] == joint;
     const json_t *children = json_object_get(json_array_get(nodes, joint + 1), "children");
     for (size_t c = 0; c < json_array_size(children); c++) {
       const json_t *bound = json_array_get(nodes, (size_t)number_at(children, c));
@@ -218,7 +225,10 @@ static void colliders_must_follow(const char *write_params) {
           *(k == 0 ? &u : &v) = number_at(matrix, k) * x + number_at(matrix, 4 + k) * y + number_at(matrix, 12 + k);
         /* Joint 1 is moved to its place and turned: (u, v) goes to (-v, u). */
         const double px = joint == 1 ? joint_x - v : u, py = joint == 1 ? joint_y + u : v;
-        if (x < -0.7) {
+        if (swapped) {
+          assert_true(joint == 0 ? x > -0.7 : x < 0.7);
+          left += x<-0.7, right += x> 0.7;
+        } else if (x < -0.7) {
           left++;
           assert_true(fabs(px - x) < 1e-9 && fabs(py - y) < 1e-9);
         } else if (x > 0.7) {
@@ -227,8 +237,9 @@ static void colliders_must_follow(const char *write_params) {
         }
       }
     }
+    assert_int_equal(count - before, of_joint);
   }
-  assert_int_equal(count, ((const qmat_colliders *)colliders)->shape_count);
+  assert_int_equal(count, made->shape_count);
   assert_true(left > 0 && right > 0);
   const json_t *own = json_object_get(json_array_get(nodes, 0), "children"); /* the mesh's node has none */
   assert_int_equal(json_array_size(own), 0);
@@ -240,8 +251,9 @@ static void colliders_must_follow(const char *write_params) {
 
 static void test_colliders_of_a_skinned_model_follow_its_joints(void **state) {
   (void)state;
-  colliders_must_follow("format=glb");
-  colliders_must_follow("format=gltf");
+  colliders_must_follow("format=glb", false);
+  colliders_must_follow("format=gltf", false);
+  colliders_must_follow("format=glb", true); /* the joints that the colliders say, and no others */
 }
 
 static void test_a_skin_beside_a_skinned_mesh_moves_with_it(void **state) {
