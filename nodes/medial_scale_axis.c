@@ -150,7 +150,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_scale_axis = {
     .name = "medial.scale_axis",
-    .version = 1,
+    .version = 2,
     .summary = "Makes the scale axis transform: the medial axis of inner balls that were scaled",
     .doc =
         "The method that the paper compares with as SAT. The balls of the samples' inner poles, no larger than "

@@ -256,7 +256,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_voxel_cores = {
     .name = "medial.voxel_cores",
-    .version = 1,
+    .version = 2,
     .summary = "Makes the voxel core of a solid: the medial axis of its voxels",
     .doc =
         "The method that the paper compares with as VC. A voxel belongs to the shape if its centre is inside the "

@@ -105,10 +105,9 @@ static qmat_status append(const solidifier *s, triangle_list *list, uint32_t a, 
 static qmat_status drop_second_sides(solidifier *s) {
   const qmat_status status =
       qmat_drop_second_sides(s->context, s->mesh->vertex_count, s->unit, s->triangle_count, s->triangles, &s->sides);
-  if (status != QMAT_OK || s->sides.solids == 0) return status;
-  s->triangles = s->sides.triangles;
-  s->triangle_count = s->sides.triangle_count;
-  return QMAT_OK;
+  if (status == QMAT_OK && s->sides.solids > 0)
+    s->triangles = s->sides.triangles, s->triangle_count = s->sides.triangle_count;
+  return status;
 }
 
 static qmat_status split_pairs(solidifier *s) {

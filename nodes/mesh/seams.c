@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/geometry/triangle.h"
 #include "core/geometry/half_edges.h"
+#include "core/geometry/triangle.h"
 
 /* The mean thickness of a solid is at least so many times the width of its seams. */
 static const double least_thickness = 4;

@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
-#include "core/geometry/triangle.h"
 #include "core/geometry/half_edges.h"
+#include "core/geometry/triangle.h"
 
 /* A side encloses nothing when its volume is less than this share of its area to the power 3/2. */
 static const double least_volume = 1e-5;

@@ -258,7 +258,7 @@ static void test_colliders_of_a_skinned_model_follow_its_joints(void **state) {
 
 static void test_a_skin_beside_a_skinned_mesh_moves_with_it(void **state) {
   (void)state;
-  qmat_value *colliders, *written = write_described("fit=contain kind=capsules", "skin_beside=true", &colliders);
+  qmat_value *colliders, *written = write_described("fit=contain kind=capsules", "skin_beside=true", false, &colliders);
   const qmat_file *file = (const qmat_file *)written;
   qmat_context context = {0};
   qmat_gltf_asset asset;
