@@ -11,7 +11,7 @@
 #include "nodes/colliders/joint_points.h"
 #include "nodes/colliders/shape_set.h"
 #include "tests/medial_meshes.h"
-#include "tests/nodes/pipeline.h"
+#include "tests/nodes/collider_run.h"
 
 static const double pi = 3.14159265358979323846;
 enum { RINGS = 31, AROUND = 16 };
@@ -89,30 +89,6 @@ static qmat_medial *cones(void) {
   return sealed_medial_mesh(spheres, 3, edges, 2, NULL, 0);
 }
 
-typedef struct result {
-  qmat_mesh *mesh;
-  qmat_medial *medial;
-  qmat_colliders *colliders;
-  qmat_report *report;
-} result;
-
-static result make(qmat_mesh *mesh, qmat_medial *medial, const char *params) {
-  result r = {.mesh = shape_seal(mesh), .medial = medial};
-  assert_true(mesh->closed && mesh->oriented);
-  qmat_value *outputs[2];
-  pipeline_must_run(2, "medial.colliders", params, (const qmat_value *[]){&mesh->base, &medial->base}, outputs);
-  r.colliders = (qmat_colliders *)outputs[0];
-  r.report = (qmat_report *)outputs[1];
-  return r;
-}
-
-static void result_free(result *r) {
-  qmat_value_release(&r->mesh->base);
-  qmat_value_release(&r->medial->base);
-  qmat_value_release(&r->colliders->base);
-  qmat_value_release(&r->report->base);
-}
-
 static size_t count_of(const qmat_colliders *c, uint32_t joint) {
   size_t count = 0;
   assert_int_equal(c->joint_count, c->shape_count);
@@ -155,7 +131,7 @@ static void test_a_bent_arm_stays_inside_the_shapes_of_its_joints(void **state) 
   for (int kind = 0; kind < 4; kind++) {
     char params[64];
     snprintf(params, sizeof params, "fit=contain kind=%s", kinds[kind]);
-    result r = make(tube(of_arm), cones(), params);
+    collider_run r = make_colliders(tube(of_arm), cones(), params, 2);
     qmat_colliders *c = r.colliders;
     assert_true(count_of(c, 0) > 0 && count_of(c, 1) > 0);
     assert_int_equal(count_of(c, 0) + count_of(c, 1), c->shape_count);
@@ -179,13 +155,13 @@ static void test_a_bent_arm_stays_inside_the_shapes_of_its_joints(void **state) 
       assert_true(away(c, r.mesh->joints[4 * v], posed, false) < 1e-9 || kind == 3);
       assert_true(away(c, r.mesh->joints[4 * v], posed, true) < 1e-9);
     }
-    result_free(&r);
+    collider_run_free(&r);
   }
 }
 
 static void test_a_cone_is_divided_where_the_joint_changes(void **state) {
   (void)state;
-  result r = make(tube(of_arm), cones(), "");
+  collider_run r = make_colliders(tube(of_arm), cones(), "", 2);
   const qmat_colliders *c = r.colliders;
   assert_int_equal(c->shape_count, 3);
   assert_int_equal(count_of(c, 0), 1);
@@ -206,7 +182,7 @@ static void test_a_cone_is_divided_where_the_joint_changes(void **state) {
     assert_int_equal(json_integer_value(json_object_get(row, "shapes")), count_of(c, (uint32_t)i));
   }
   assert_string_equal(json_string_value(json_object_get(r.report->root, "pose")), "bind");
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 static void test_what_is_between_the_parts_of_a_cone_is_halved(void **state) {
@@ -234,7 +210,7 @@ static void test_a_slab_is_divided_where_the_joint_changes(void **state) {
   (void)state;
   const double spheres[] = {-1.2, -0.1, 0, 0.3, 1.2, -0.1, 0, 0.3, 0, 0.1, 0, 0.3};
   const uint32_t edges[] = {0, 1, 0, 2, 1, 2}, triangle[] = {0, 1, 2};
-  result r = make(tube(of_arm), sealed_medial_mesh(spheres, 3, edges, 3, triangle, 1), "");
+  collider_run r = make_colliders(tube(of_arm), sealed_medial_mesh(spheres, 3, edges, 3, triangle, 1), "", 2);
   const qmat_colliders *c = r.colliders;
   bool left = false, right = false;
   assert_true(count_of(c, 0) > 0 && count_of(c, 1) > 0);
@@ -247,17 +223,17 @@ static void test_a_slab_is_divided_where_the_joint_changes(void **state) {
       left = left || s[0] < -1.19, right = right || s[0] > 1.19;
     }
   assert_true(left && right);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 static void test_both_arms_of_a_biped_have_shapes(void **state) {
   (void)state;
   static const char *const params[] = {"fit=contain kind=capsules", "fit=contain kind=hulls", "fit=both", "fit=inside"};
   for (int i = 0; i < 4; i++) {
-    result r = make(tube(of_biped), cones(), params[i]);
+    collider_run r = make_colliders(tube(of_biped), cones(), params[i], 2);
     for (uint32_t joint = 0; joint < 3; joint++) assert_true(count_of(r.colliders, joint) > 0);
     if (i == 1) assert_int_equal(r.colliders->shape_count, 3);
-    result_free(&r);
+    collider_run_free(&r);
   }
 }
 
@@ -266,10 +242,10 @@ static void test_shapes_of_two_joints_are_not_joined(void **state) {
   static const char *const params[] = {"fit=contain kind=capsules shapes=1", "fit=contain kind=hulls shapes=1",
                                        "kind=spheres shapes=1"};
   for (int i = 0; i < 3; i++) {
-    result r = make(tube(of_biped), cones(), params[i]);
+    collider_run r = make_colliders(tube(of_biped), cones(), params[i], 2);
     assert_int_equal(r.colliders->shape_count, 3);
     for (uint32_t joint = 0; joint < 3; joint++) assert_int_equal(count_of(r.colliders, joint), 1);
-    result_free(&r);
+    collider_run_free(&r);
   }
 }
 
@@ -277,7 +253,8 @@ static void test_shapes_of_two_joints_are_not_joined(void **state) {
 static void must_be_as_unskinned(skin_fn *skin, uint32_t joint) {
   static const char *const params[] = {"fit=contain", "fit=contain kind=hulls", "kind=spheres shapes=4", "fit=inside"};
   for (int i = 0; i < 4; i++) {
-    result a = make(tube(NULL), cones(), params[i]), b = make(tube(skin), cones(), params[i]);
+    collider_run a = make_colliders(tube(NULL), cones(), params[i], 2),
+                 b = make_colliders(tube(skin), cones(), params[i], 2);
     qmat_colliders *c = a.colliders, *d = b.colliders;
     assert_int_equal(c->joint_count, 0);
     assert_null(json_object_get(a.report->root, "joints"));
@@ -288,8 +265,8 @@ static void must_be_as_unskinned(skin_fn *skin, uint32_t joint) {
     assert_memory_equal(c->spheres, d->spheres, 4 * c->sphere_count * sizeof *c->spheres);
     assert_memory_equal(c->shapes, d->shapes, 3 * c->shape_count * sizeof *c->shapes);
     assert_memory_equal(c->points, d->points, 3 * c->point_count * sizeof *c->points);
-    result_free(&a);
-    result_free(&b);
+    collider_run_free(&a);
+    collider_run_free(&b);
   }
 }
 
@@ -305,10 +282,10 @@ static void test_of_equal_weights_the_lowest_joint_wins(void **state) {
 
 static void test_a_joint_that_is_nowhere_the_strongest_has_no_shape(void **state) {
   (void)state;
-  result r = make(tube(with_a_helper), cones(), "fit=contain");
+  collider_run r = make_colliders(tube(with_a_helper), cones(), "fit=contain", 2);
   assert_int_equal(count_of(r.colliders, 2), 0);
   assert_true(count_of(r.colliders, 0) > 0 && count_of(r.colliders, 1) > 0);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 static void test_threads_change_nothing_and_a_cancel_is_obeyed(void **state) {

@@ -13,33 +13,9 @@
 #include "nodes/colliders/shape_set.h"
 #include "nodes/measure/area_samples.h"
 #include "tests/medial_meshes.h"
-#include "tests/nodes/pipeline.h"
+#include "tests/nodes/collider_run.h"
 
 static const double pi = 3.14159265358979323846;
-
-typedef struct result {
-  qmat_mesh *mesh;
-  qmat_medial *medial;
-  qmat_colliders *colliders;
-  qmat_report *report;
-} result;
-
-/* Takes mesh and medial mesh over. */
-static result make(qmat_mesh *mesh, qmat_medial *medial, const char *params, int threads) {
-  result r = {.mesh = mesh->base.sealed ? mesh : shape_seal(mesh), .medial = medial};
-  qmat_value *outputs[2];
-  pipeline_must_run(threads, "medial.colliders", params, (const qmat_value *[]){&r.mesh->base, &medial->base}, outputs);
-  r.colliders = (qmat_colliders *)outputs[0];
-  r.report = (qmat_report *)outputs[1];
-  return r;
-}
-
-static void result_free(result *r) {
-  qmat_value_release(&r->mesh->base);
-  qmat_value_release(&r->medial->base);
-  qmat_value_release(&r->colliders->base);
-  qmat_value_release(&r->report->base);
-}
 
 static qmat_mesh *box_around(double x, double y, double z) {
   qmat_mesh *mesh = shape_new();
@@ -73,8 +49,8 @@ static void test_two_joined_spheres_are_one_capsule(void **state) {
   (void)state;
   static const double spheres[] = {-1, 0, 0, 0.5, 1, 0, 0, 0.25};
   static const uint32_t edge[] = {0, 1};
-  result r = make(box_around(2, 1, 1), sealed_medial_mesh(spheres, 2, edge, 1, NULL, 0),
-                  "hull_points=1024 hull_error=0.0002", 0);
+  collider_run r = make_colliders(box_around(2, 1, 1), sealed_medial_mesh(spheres, 2, edge, 1, NULL, 0),
+                                  "hull_points=1024 hull_error=0.0002", 0);
   assert_int_equal(r.colliders->shape_count, 1);
   assert_int_equal(r.colliders->sphere_count, 2);
   assert_memory_equal(r.colliders->shapes, ((uint32_t[]){0, 1, 1}), 3 * sizeof(uint32_t));
@@ -97,13 +73,14 @@ static void test_two_joined_spheres_are_one_capsule(void **state) {
   const double corner = (sqrt(3) - 0.25) / sqrt(24);
   assert_true(pipeline_number(r.report, "max_uncovered_gap") <= corner);
   assert_near(pipeline_number(r.report, "max_uncovered_gap"), corner, 0.02);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 static void test_a_ball_that_leaves_a_cube_protrudes_by_hand(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1.2};
-  result r = make(box_around(1, 1, 1), sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "samples=100000", 0);
+  collider_run r =
+      make_colliders(box_around(1, 1, 1), sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "samples=100000", 0);
   /* Six caps of height 0.2, each of area 2 pi 1.2 0.2, of which no point is farther out than 0.2. */
   assert_near(pipeline_number(r.report, "protrusion"), 6 * 0.2 / (2 * 1.2), 0.01);
   assert_near(pipeline_number(r.report, "protrusion_mean"), 0.5 * 0.1 / sqrt(12), 0.001);
@@ -112,7 +89,7 @@ static void test_a_ball_that_leaves_a_cube_protrudes_by_hand(void **state) {
   assert_near(pipeline_number(r.report, "volume_ratio"), volume / 8, 0.01);
   assert_near(pipeline_number(r.report, "coverage"), (volume - 6 * cap) / 8, 0.01);
   assert_near(pipeline_number(r.report, "iou"), (volume - 6 * cap) / (8 + 6 * cap), 0.01);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 static void test_mass_properties_of_a_box_by_hand(void **state) {
@@ -122,13 +99,13 @@ static void test_mass_properties_of_a_box_by_hand(void **state) {
     qmat_mesh *box = box_around(1, 2, 3);
     shape_map(box, 1, 10, 20, 30);
     box->meters_per_unit = units[i];
-    result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=2.5", 0);
+    collider_run r = make_colliders(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=2.5", 0);
     const double mass = 2.5 * (i < 2 ? 48 : 48e-6), *body = r.colliders->body;
     const double expected[10] = {mass, 10, 20, 30, mass / 12 * (16 + 36), mass / 12 * (4 + 36), mass / 12 * (4 + 16)};
     assert_int_equal(r.colliders->body_count, 1);
     for (int k = 0; k < 10; k++) assert_near(body[k], expected[k], 1e-9 * (k > 0 && k < 4 ? 30 : mass));
     assert_near(pipeline_number(r.report, "mass"), mass, 1e-9 * mass);
-    result_free(&r);
+    collider_run_free(&r);
   }
 }
 
@@ -139,11 +116,11 @@ static void test_sheets_have_no_mass(void **state) {
   shape_triangle(box, 0, 1, shape_vertex(box, 5, 6, 7));
   box->sheet_triangle_count = 1;
   box->closed = box->oriented = true;
-  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=1", 0);
+  collider_run r = make_colliders(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=1", 0);
   const double expected[10] = {48, 0, 0, 0, 4 * 52, 4 * 40, 4 * 20};
   assert_int_equal(r.colliders->body_count, 1);
   for (int k = 0; k < 10; k++) assert_near(r.colliders->body[k], expected[k], 1e-6);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 static void test_inertia_turns_with_the_solid(void **state) {
@@ -151,7 +128,7 @@ static void test_inertia_turns_with_the_solid(void **state) {
   static const double ball[] = {0, 0, 0, 0.5};
   qmat_mesh *box = box_around(1, 2, 3);
   shape_rotate(box);
-  result r = make(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=1", 0);
+  collider_run r = make_colliders(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=1", 0);
   const double *i = &r.colliders->body[4], m = 48 / 12.0;
   /* Invariants of the tensor: trace, sum of principal minors, determinant. */
   const double a = m * 52, b = m * 40, c = m * 20;
@@ -162,7 +139,7 @@ static void test_inertia_turns_with_the_solid(void **state) {
       i[0] * (i[1] * i[2] - i[5] * i[5]) - i[3] * (i[3] * i[2] - i[5] * i[4]) + i[4] * (i[3] * i[5] - i[1] * i[4]),
       a * b * c, 1e-4);
   assert_true(fabs(i[3]) > 1);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 static void test_nested_and_degenerate_shapes_are_left_out(void **state) {
@@ -170,23 +147,24 @@ static void test_nested_and_degenerate_shapes_are_left_out(void **state) {
   /* Sphere 1 is inside sphere 0, with which it is joined; sphere 2 has no radius; sphere 3 is inside the capsule. */
   static const double nested[] = {0, 0, 0, 1, 0.3, 0, 0, 0.2, 4, 0, 0, 0, 2, 0, 0, 0.1};
   static const uint32_t edges[] = {0, 1, 0, 2};
-  result r = make(box_around(5, 1, 1), sealed_medial_mesh(nested, 4, edges, 2, NULL, 0), "least_radius=0.001", 0);
+  collider_run r =
+      make_colliders(box_around(5, 1, 1), sealed_medial_mesh(nested, 4, edges, 2, NULL, 0), "least_radius=0.001", 0);
   assert_int_equal(r.colliders->shape_count, 1);
   assert_int_equal(r.colliders->sphere_count, 2);
   assert_near(r.colliders->spheres[7], 0.001 * sqrt(108), 1e-12);
-  result_free(&r);
+  collider_run_free(&r);
   /* A slab whose large sphere reaches beyond the line of the others is two capsules and no hull. */
   static const double steep[] = {0, 0, 0, 1, 1.2, 0.1, 0, 0.1, 1.2, -0.1, 0, 0.1};
   static const uint32_t slab[] = {0, 1, 2};
-  r = make(box_around(3, 3, 3), sealed_medial_mesh(steep, 3, NULL, 0, slab, 1), "", 0);
+  r = make_colliders(box_around(3, 3, 3), sealed_medial_mesh(steep, 3, NULL, 0, slab, 1), "", 0);
   assert_int_equal(pipeline_count(r.report, "hulls_of_three") + pipeline_count(r.report, "capsules"),
                    r.colliders->shape_count);
-  result_free(&r);
+  collider_run_free(&r);
   /* Two equal spheres are one. */
   static const double equal[] = {0, 0, 0, 1, 0, 0, 0, 1};
-  r = make(box_around(1, 1, 1), sealed_medial_mesh(equal, 2, NULL, 0, NULL, 0), "", 0);
+  r = make_colliders(box_around(1, 1, 1), sealed_medial_mesh(equal, 2, NULL, 0, NULL, 0), "", 0);
   assert_int_equal(r.colliders->shape_count, 1);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 /* The first output of a node; the others are released. */
@@ -211,11 +189,11 @@ static void describe(const char *name, const char *epsilon, qmat_mesh **mesh, qm
   qmat_value_release(initial);
 }
 
-static result make_of_model(const char *name, const char *params) {
+static collider_run make_of_model(const char *name, const char *params) {
   qmat_mesh *mesh;
   qmat_medial *medial;
   describe(name, "epsilon=3%", &mesh, &medial);
-  return make(mesh, medial, params, 0);
+  return make_colliders(mesh, medial, params, 0);
 }
 
 static qmat_envelope *envelope_of(const qmat_colliders *c) {
@@ -229,7 +207,7 @@ static qmat_envelope *envelope_of(const qmat_colliders *c) {
 
 static void test_contain_leaves_none_of_a_million_points_outside(void **state) {
   (void)state;
-  result r = make_of_model("l-bracket", "fit=contain");
+  collider_run r = make_of_model("l-bracket", "fit=contain");
   qmat_context context = {0};
   qmat_surface *surface;
   assert_int_equal(qmat_surface_new(&context, r.mesh, &surface), QMAT_OK);
@@ -261,7 +239,7 @@ static void test_contain_leaves_none_of_a_million_points_outside(void **state) {
                              : 0));
   qmat_envelope_free(envelope);
   qmat_surface_free(surface);
-  result_free(&r);
+  collider_run_free(&r);
   qmat_context_uninit(&context);
 }
 
@@ -272,15 +250,15 @@ static void test_contain_grows_shapes_only_where_the_solid_is_outside(void **sta
   qmat_mesh *mesh;
   qmat_medial *medial;
   describe("curved-sheet", "epsilon=1%", &mesh, &medial);
-  result r = make(mesh, medial, "fit=contain", 0);
+  collider_run r = make_colliders(mesh, medial, "fit=contain", 0);
   assert_true(json_is_true(json_object_get(r.report->root, "proved")));
   assert_true(pipeline_number(r.report, "volume_ratio") < 1.8);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 static void test_inside_leaves_no_point_of_a_shape_outside(void **state) {
   (void)state;
-  result r = make_of_model("l-bracket", "fit=inside");
+  collider_run r = make_of_model("l-bracket", "fit=inside");
   qmat_context context = {0};
   qmat_surface *surface;
   assert_int_equal(qmat_surface_new(&context, r.mesh, &surface), QMAT_OK);
@@ -306,7 +284,7 @@ static void test_inside_leaves_no_point_of_a_shape_outside(void **state) {
   assert_near(pipeline_number(r.report, "protrusion"), 0, 0);
   assert_true(pipeline_number(r.report, "coverage") > 0.6);
   qmat_surface_free(surface);
-  result_free(&r);
+  collider_run_free(&r);
   qmat_context_uninit(&context);
 }
 
@@ -320,20 +298,20 @@ static void test_inside_fills_a_box_and_a_thick_sheet(void **state) {
   qmat_mesh *of_box;
   qmat_medial *medial;
   describe("box", "epsilon=2%", &of_box, &medial);
-  result r = make(of_box, medial, "fit=inside", 0);
+  collider_run r = make_colliders(of_box, medial, "fit=inside", 0);
   assert_true(json_is_true(json_object_get(r.report->root, "proved")));
   assert_true(pipeline_number(r.report, "coverage") > 0.9);
-  result_free(&r);
+  collider_run_free(&r);
   const double half = 0.1, spheres[16] = {-1, -1, 0, half, 1, -1, 0, half, 1, 1, 0, half, -1, 1, 0, half};
   const uint32_t triangles[6] = {0, 1, 2, 0, 2, 3}, edges[10] = {0, 1, 0, 2, 0, 3, 1, 2, 2, 3};
   qmat_mesh *mesh = shape_new();
   shape_add_sheet(mesh, 1, 1, place_square);
   mesh->closed = mesh->oriented = true;
   mesh->sheet_thickness = 2 * half;
-  r = make(mesh, sealed_medial_mesh(spheres, 4, edges, 5, triangles, 2), "fit=inside", 0);
+  r = make_colliders(mesh, sealed_medial_mesh(spheres, 4, edges, 5, triangles, 2), "fit=inside", 0);
   assert_true(json_is_true(json_object_get(r.report->root, "proved")));
   assert_true(pipeline_number(r.report, "coverage") > 0.99);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 /* Whether a point is in the hull of a shape, or nearer than `slack` to one of its planes. */
@@ -354,8 +332,8 @@ static bool is_in_hull(const qmat_colliders *c, size_t shape, const double point
 /* A ball around a box leaves only the box in its hull, as exactly as the planes of facets can. */
 static void test_the_hull_of_a_ball_around_a_box_is_the_box(void **state) {
   (void)state;
-  result r = make(box_around(1, 2, 3), sealed_medial_mesh((double[]){0, 0, 0, 4}, 1, NULL, 0, NULL, 0),
-                  "fit=contain kind=hulls", 0);
+  collider_run r = make_colliders(box_around(1, 2, 3), sealed_medial_mesh((double[]){0, 0, 0, 4}, 1, NULL, 0, NULL, 0),
+                                  "fit=contain kind=hulls", 0);
   assert_true(json_is_true(json_object_get(r.report->root, "proved")));
   assert_int_equal(r.colliders->shape_count, 1);
   assert_int_equal(qmat_shape_width(r.colliders->shapes), 3);
@@ -363,7 +341,7 @@ static void test_the_hull_of_a_ball_around_a_box_is_the_box(void **state) {
   assert_near(hull_volume(r.colliders, 0), 48, 1e-3);
   assert_true(hull_volume(r.colliders, 0) > 48);
   assert_near(pipeline_number(r.report, "hull_protrusion"), 1e-4, 2e-6);
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 /* Hulls of parts of a box become the box. Those of two boxes stay two, unless only one is allowed, which is 1 away from
@@ -371,24 +349,25 @@ static void test_the_hull_of_a_ball_around_a_box_is_the_box(void **state) {
 static void test_hulls_are_joined_where_the_solid_is_convex(void **state) {
   (void)state;
   const double spheres[8] = {0, 0, 1.5, 3, 0, 0, -1.5, 3};
-  result r = make(box_around(1, 2, 3), sealed_medial_mesh(spheres, 2, NULL, 0, NULL, 0), "fit=contain kind=hulls", 0);
+  collider_run r = make_colliders(box_around(1, 2, 3), sealed_medial_mesh(spheres, 2, NULL, 0, NULL, 0),
+                                  "fit=contain kind=hulls", 0);
   assert_int_equal(pipeline_count(r.report, "single_spheres"), 2);
   assert_int_equal(pipeline_count(r.report, "shapes"), 1);
   assert_int_equal(r.colliders->point_count, 8);
   assert_near(hull_volume(r.colliders, 0), 48, 1e-3);
   assert_true(hull_volume(r.colliders, 0) > 48);
-  result_free(&r);
+  collider_run_free(&r);
   for (size_t most = 0; most < 3; most++) {
     qmat_mesh *mesh = box_around(1, 1, 1);
     shape_add_box(mesh, 3, -1, -1, 5, 1, 1, false);
     char params[64];
     snprintf(params, sizeof params, "fit=contain kind=hulls shapes=%zu", most);
-    r = make(mesh, sealed_medial_mesh((double[]){0, 0, 0, 2, 4, 0, 0, 2}, 2, NULL, 0, NULL, 0), params, 0);
+    r = make_colliders(mesh, sealed_medial_mesh((double[]){0, 0, 0, 2, 4, 0, 0, 2}, 2, NULL, 0, NULL, 0), params, 0);
     assert_int_equal(r.colliders->shape_count, most == 1 ? 1 : 2);
     assert_near(hull_volume(r.colliders, 0), most == 1 ? 24 : 8, 1e-3);
     const double outside = most == 1 ? 1 / sqrt(44) : 0, bound = pipeline_number(r.report, "hull_protrusion");
     assert_true(bound >= outside && bound <= outside + 1.02e-4);
-    result_free(&r);
+    collider_run_free(&r);
   }
 }
 
@@ -412,8 +391,8 @@ static void test_a_sheet_beside_a_box_has_a_hull_of_its_own(void **state) {
     shape_add_sheet(mesh, 2, 3, place_wall);
     mesh->closed = mesh->oriented = true;
     mesh->sheet_thickness = thick ? 0.2 : 0;
-    result r = make(mesh, sealed_medial_mesh(spheres, 5, edges, 5, triangles, 2),
-                    "fit=contain kind=hulls hull_error=0.001", 0);
+    collider_run r = make_colliders(mesh, sealed_medial_mesh(spheres, 5, edges, 5, triangles, 2),
+                                    "fit=contain kind=hulls hull_error=0.001", 0);
     assert_true(json_is_true(json_object_get(r.report->root, "proved")));
     assert_int_equal(r.colliders->shape_count, 2 + thick);
     assert_int_equal(json_object_get(r.report->root, "hull_protrusion") != NULL, !thick);
@@ -429,7 +408,7 @@ static void test_a_sheet_beside_a_box_has_a_hull_of_its_own(void **state) {
         assert_true(is_in_hull(r.colliders, wall, point, 0));
       }
     }
-    result_free(&r);
+    collider_run_free(&r);
   }
 }
 
@@ -451,7 +430,7 @@ static void test_contain_leaves_no_point_of_a_thick_sheet_outside(void **state) 
     mesh->closed = mesh->oriented = true;
     mesh->sheet_thickness = 2 * half;
     snprintf(params, sizeof params, "fit=contain kind=%s", kinds[kind]);
-    result r = make(mesh, sealed_medial_mesh(spheres, 5, edges, 5, triangles, 2), params, 0);
+    collider_run r = make_colliders(mesh, sealed_medial_mesh(spheres, 5, edges, 5, triangles, 2), params, 0);
     assert_true(json_is_true(json_object_get(r.report->root, "proved")));
     assert_near(pipeline_number(r.report, "coverage"), 1, 0);
     assert_near(pipeline_number(r.report, "max_uncovered_gap"), 0, 0);
@@ -476,7 +455,7 @@ static void test_contain_leaves_no_point_of_a_thick_sheet_outside(void **state) 
     assert_int_equal(outside_shapes, 0);
     assert_int_equal(outside_hulls, 0);
     qmat_envelope_free(envelope);
-    result_free(&r);
+    collider_run_free(&r);
   }
 }
 
@@ -489,11 +468,11 @@ static void test_the_gap_of_a_thick_sheet_is_that_of_its_sides(void **state) {
   shape_add_sheet(mesh, 4, 4, place_square);
   mesh->closed = mesh->oriented = true;
   mesh->sheet_thickness = 0.2;
-  result made = make(mesh, sealed_medial_mesh(spheres, 4, edges, 5, triangles, 2), "fit=both", 0);
+  collider_run made = make_colliders(mesh, sealed_medial_mesh(spheres, 4, edges, 5, triangles, 2), "fit=both", 0);
   const double gap = 0.06 / sqrt(8);
   assert_near(pipeline_number(made.report, "gap_mean"), gap, 1e-9);
   assert_near(pipeline_number(made.report, "max_uncovered_gap"), gap, 1e-9);
-  result_free(&made);
+  collider_run_free(&made);
 }
 
 /* A needle of a sheet, without area, has a hull, too. */
@@ -505,14 +484,15 @@ static void test_a_sheet_without_area_has_a_hull(void **state) {
   mesh->sheet_triangle_count = 1;
   mesh->closed = mesh->oriented = true;
   const double spheres[12] = {0, 0, 0, 2, 2, 0, 0, 0, 3, 0, 0, 0};
-  result r = make(mesh, sealed_medial_mesh(spheres, 3, (uint32_t[]){1, 2}, 1, NULL, 0), "fit=contain kind=hulls", 0);
+  collider_run r =
+      make_colliders(mesh, sealed_medial_mesh(spheres, 3, (uint32_t[]){1, 2}, 1, NULL, 0), "fit=contain kind=hulls", 0);
   assert_int_equal(r.colliders->shape_count, 2);
   for (int k = 0; k < 2; k++) {
     bool found = false;
     for (size_t s = 0; s < 2; s++) found = found || is_in_hull(r.colliders, s, (double[]){2 + k, 0, 0}, 0);
     assert_true(found);
   }
-  result_free(&r);
+  collider_run_free(&r);
 }
 
 /* Of an l-bracket, all points are in hulls, and these have less volume beyond it than the shapes. */
@@ -523,7 +503,8 @@ static void test_hulls_of_the_solid_contain_it(void **state) {
   describe("l-bracket", "epsilon=3%", &mesh, &medial);
   qmat_value_retain(&mesh->base);
   qmat_value_retain(&medial->base);
-  result r = make(mesh, medial, "fit=contain kind=hulls", 0), shapes = make(mesh, medial, "fit=contain", 0);
+  collider_run r = make_colliders(mesh, medial, "fit=contain kind=hulls", 0),
+               shapes = make_colliders(mesh, medial, "fit=contain", 0);
   assert_in_range(r.colliders->shape_count, 1, shapes.colliders->shape_count);
   qmat_context context = {0};
   qmat_surface *surface;
@@ -548,8 +529,8 @@ static void test_hulls_of_the_solid_contain_it(void **state) {
   assert_true(held < of_shapes);
   qmat_surface_free(surface);
   qmat_context_uninit(&context);
-  result_free(&r);
-  result_free(&shapes);
+  collider_run_free(&r);
+  collider_run_free(&shapes);
 }
 
 static void test_budget_kind_and_hull_points_are_kept(void **state) {
@@ -570,7 +551,7 @@ static void test_budget_kind_and_hull_points_are_kept(void **state) {
   for (size_t i = 0; i < sizeof most / sizeof *most; i++) {
     qmat_value_retain(&mesh->base);
     qmat_value_retain(&medial->base);
-    result r = make(mesh, medial, cases[i][0], 0);
+    collider_run r = make_colliders(mesh, medial, cases[i][0], 0);
     assert_in_range(r.colliders->shape_count, 1, most[i]);
     if (strstr(cases[i][0], "capsules")) assert_int_equal(pipeline_count(r.report, "hulls_of_three"), 0);
     if (strstr(cases[i][0], "spheres"))
@@ -582,7 +563,7 @@ static void test_budget_kind_and_hull_points_are_kept(void **state) {
       assert_int_equal(qmat_shape_width(&r.colliders->shapes[3 * s]), 3);
     if (!strstr(cases[i][0], "both")) assert_true(json_is_true(json_object_get(r.report->root, "proved")));
     if (strstr(cases[i][0], "contain")) assert_near(pipeline_number(r.report, "coverage"), 1, 0);
-    result_free(&r);
+    collider_run_free(&r);
   }
   qmat_value_release(&mesh->base);
   qmat_value_release(&medial->base);
@@ -600,10 +581,10 @@ static void test_one_two_and_eight_threads_make_the_same_bytes(void **state) {
     for (int threads = 1; threads <= 8; threads *= threads == 2 ? 4 : 2) {
       qmat_value_retain(&mesh->base);
       qmat_value_retain(&medial->base);
-      result r = make(mesh, medial, params[p], threads);
+      collider_run r = make_colliders(mesh, medial, params[p], threads);
       if (threads == 1) first = r.colliders->base.digest;
       assert_true(qmat_digest_equal(&first, &r.colliders->base.digest));
-      result_free(&r);
+      collider_run_free(&r);
     }
   }
   qmat_value_release(&mesh->base);

@@ -14,6 +14,7 @@
 #include "io/draco.h"
 #include "io/mesh/ma.h"
 #include "nodes/nodes.h"
+#include "tests/hull_colliders.h"
 #include "tests/io/gltf/gltf_assets.h"
 #include "tests/medial_meshes.h"
 #include "tests/shapes.h"
@@ -423,28 +424,9 @@ static qmat_scene *make_gltf_scene(const char *name, const qmat_writer *glb) {
 
 /* A sphere of radius 2 with a tetrahedron for a hull, and its mass properties. */
 static qmat_colliders *make_colliders(void) {
+  static const double sphere[] = {0, 0, 0, 2}, body[] = {7, 0, 0, 0, 1, 1, 1, 0, 0, 0};
   static const double tetrahedron[] = {-2, -2, -2, 2, 2, -2, -2, 2, 2, 2, -2, 2};
-  static const double body[] = {7, 0, 0, 0, 1, 1, 1, 0, 0, 0};
-  static const uint32_t faces[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
-  qmat_context context = {0};
-  qmat_colliders *c = qmat_colliders_new();
-  assert_non_null(c);
-  c->sphere_count = c->shape_count = c->body_count = 1;
-  c->point_count = c->triangle_count = 4;
-  c->spheres = qmat_calloc(4, sizeof(double));
-  c->spheres[3] = 2;
-  c->shapes = qmat_calloc(3, sizeof(uint32_t));
-  c->points = qmat_alloc(12, sizeof(double));
-  c->triangles = qmat_alloc(12, sizeof(uint32_t));
-  c->hull_ends = qmat_alloc(2, sizeof(uint32_t));
-  c->body = qmat_alloc(10, sizeof(double));
-  memcpy(c->points, tetrahedron, sizeof tetrahedron);
-  memcpy(c->triangles, faces, sizeof faces);
-  memcpy(c->body, body, sizeof body);
-  c->hull_ends[0] = c->hull_ends[1] = 4;
-  assert_int_equal(qmat_value_seal(&context, &c->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return c;
+  return hull_colliders(sphere, 1, (const uint32_t[]){0, 0, 0}, 1, body, tetrahedron, 0);
 }
 
 /* Colliders of a centimetre mesh of a metre scene, beside a glTF file: a sphere of radius 2. */

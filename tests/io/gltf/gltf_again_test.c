@@ -13,6 +13,7 @@
 #include "io/gltf/gltf_asset.h"
 #include "io/gltf/gltf_colliders.h"
 #include "io/gltf/gltf_write.h"
+#include "tests/hull_colliders.h"
 #include "tests/io/gltf/gltf_assets.h"
 #include "tests/medial_meshes.h"
 #include "tests/shapes.h"
@@ -32,35 +33,10 @@ static const char boxes[] =
 
 /* A slab and a sphere, each with a tetrahedron for a hull. */
 static qmat_colliders *make_colliders(void) {
-  static const double spheres[] = {0, 0, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1};
-  static const uint32_t shapes[] = {0, 1, 2, 0, 0, 0}, faces[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
-  static const double tetrahedron[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}, body[] = {2, 0, 0, 0, 1, 1, 1, 0, 0, 0};
-  qmat_context context = {0};
-  qmat_colliders *c = qmat_colliders_new();
-  assert_non_null(c);
-  c->sphere_count = 3;
-  c->shape_count = 2;
-  c->point_count = c->triangle_count = 8;
-  c->body_count = 1;
-  c->spheres = qmat_alloc(12, sizeof(double));
-  c->shapes = qmat_alloc(6, sizeof(uint32_t));
-  c->points = qmat_alloc(24, sizeof(double));
-  c->triangles = qmat_alloc(24, sizeof(uint32_t));
-  c->hull_ends = qmat_alloc(4, sizeof(uint32_t));
-  c->body = qmat_alloc(10, sizeof(double));
-  memcpy(c->spheres, spheres, sizeof spheres);
-  memcpy(c->shapes, shapes, sizeof shapes);
-  memcpy(c->body, body, sizeof body);
-  for (uint32_t i = 0; i < 2; i++) {
-    for (uint32_t k = 0; k < 12; k++) {
-      c->points[12 * i + k] = tetrahedron[k];
-      c->triangles[12 * i + k] = faces[k] + 4 * i;
-    }
-    c->hull_ends[2 * i] = c->hull_ends[2 * i + 1] = 4 * (i + 1);
-  }
-  assert_int_equal(qmat_value_seal(&context, &c->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return c;
+  static const double spheres[] = {0, 0, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1}, body[] = {2, 0, 0, 0, 1, 1, 1, 0, 0, 0};
+  static const uint32_t shapes[] = {0, 1, 2, 0, 0, 0};
+  static const double tetrahedron[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  return hull_colliders(spheres, 3, shapes, 2, body, tetrahedron, 0);
 }
 
 /* Adds medial meshes to both boxes of an asset, with skins, and with colliders of the forms (0: without). */

@@ -13,6 +13,7 @@
 #include "io/gltf/gltf_motion.h"
 #include "io/robot_write.h"
 #include "io/usd/usd_colliders.h"
+#include "tests/hull_colliders.h"
 #include "tests/io/gltf/gltf_assets.h"
 #include "tests/shapes.h"
 
@@ -22,33 +23,8 @@ static qmat_colliders *example(void) {
   static const double spheres[] = {1, 2, 3, 0.5, 4, 2, 3, 0.25, 1, 0, 3, 0.5, 1, 2, 6, 0.5};
   static const uint32_t shapes[] = {0, 2, 3, 0, 1, 1, 0, 2, 2, 0, 0, 0};
   static const double tetrahedron[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
-  static const uint32_t faces[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
   static const double body[] = {2, 1, 2, 3, 5, 6, 7, 0.5, -0.25, 0.125};
-  qmat_colliders *c = qmat_colliders_new();
-  assert_non_null(c);
-  c->sphere_count = c->shape_count = 4;
-  c->point_count = c->triangle_count = 16;
-  c->body_count = 1;
-  c->spheres = qmat_alloc(16, sizeof(double));
-  c->shapes = qmat_alloc(12, sizeof(uint32_t));
-  c->points = qmat_alloc(48, sizeof(double));
-  c->triangles = qmat_alloc(48, sizeof(uint32_t));
-  c->hull_ends = qmat_alloc(8, sizeof(uint32_t));
-  c->body = qmat_alloc(10, sizeof(double));
-  memcpy(c->spheres, spheres, sizeof spheres);
-  memcpy(c->shapes, shapes, sizeof shapes);
-  memcpy(c->body, body, sizeof body);
-  for (uint32_t i = 0; i < 4; i++) {
-    for (uint32_t k = 0; k < 12; k++) {
-      c->points[12 * i + k] = tetrahedron[k] + 10 * i;
-      c->triangles[12 * i + k] = faces[k] + 4 * i;
-    }
-    c->hull_ends[2 * i] = c->hull_ends[2 * i + 1] = 4 * (i + 1);
-  }
-  qmat_context context = {0};
-  assert_int_equal(qmat_value_seal(&context, &c->base), QMAT_OK);
-  qmat_context_uninit(&context);
-  return c;
+  return hull_colliders(spheres, 4, shapes, 4, body, tetrahedron, 10);
 }
 
 /* v turned by the quaternion q. */

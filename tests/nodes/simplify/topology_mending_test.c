@@ -105,11 +105,31 @@ static void test_edges_of_sheets_are_not_divided(void **state) {
   }
 }
 
+/* Edits remove no spheres: where another start has fewer, none is tried. */
+static void test_a_beaten_result_is_not_mended(void **state) {
+  (void)state;
+  static const double spheres[] = {0.1, 0, 0, 0.01, 0, 0.1, 0, 0.01, 0, 0, 0.1, 0.01, 0, 0, 0, 0.01};
+  static const uint32_t walls[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3}, loop[] = {0, 1, 1, 2, 2, 3, 0, 3};
+  static const size_t rivals[] = {0, 3, 4, SIZE_MAX}; /* 0: not known yet; SIZE_MAX: none */
+  for (size_t i = 0; i < sizeof rivals / sizeof *rivals; i++)
+    for (int has_walls = 0; has_walls < 2; has_walls++) {
+      scene s;
+      const _Atomic size_t rival = rivals[i];
+      make_scene(&s, medial_mesh(spheres, 4, loop, has_walls ? 0 : 4, walls, has_walls ? 4 : 0));
+      s.simplification.rival_count = &rival;
+      assert_int_equal(qmat_simplification_open_voids(&s.simplification, &s.result), QMAT_OK);
+      assert_int_equal(qmat_simplification_close_loops(&s.simplification, &s.result), QMAT_OK);
+      assert_true(rivals[i] == 3 ? s.edits == 0 : s.edits > 0);
+      free_scene(&s);
+    }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_a_limited_number_of_edits_is_tried_for_a_loop),
       cmocka_unit_test(test_walls_of_sheets_are_not_divided),
       cmocka_unit_test(test_edges_of_sheets_are_not_divided),
+      cmocka_unit_test(test_a_beaten_result_is_not_mended),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
