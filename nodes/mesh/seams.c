@@ -10,14 +10,14 @@
 
 /* The mean thickness of a solid is at least so many times the width of its seams. */
 static const double least_thickness = 4;
-/* A direction that no plane of a model is likely to be perpendicular to. */
-static const double direction[3] = {0.8017, 0.5233, 0.2887};
+/* Two directions that no plane of a model is likely to be perpendicular to. */
+static const double along_strips[3] = {0.8017, 0.5233, 0.2887}, across_strips[3] = {0.3119, -0.7331, 0.6043};
 /* Divisions with ever fewer seams. */
 enum { MOST_ROUNDS = 3 };
 
 /* A border edge, as its triangle runs along it. */
 typedef struct border_edge {
-  double along; /* of its middle */
+  double strip, along; /* of its middle: a strip as wide as the tolerance, and the place along it */
   uint32_t from, to, triangle;
 } border_edge;
 
@@ -63,8 +63,16 @@ static double distance(const seam_finder *s, uint32_t a, uint32_t b) {
 
 static int compare_border_edges(const void *left, const void *right) {
   const border_edge *a = left, *b = right;
+  if (a->strip != b->strip) return a->strip < b->strip ? -1 : 1;
   if (a->along != b->along) return a->along < b->along ? -1 : 1;
   return (a->triangle > b->triangle) - (a->triangle < b->triangle);
+}
+
+static border_edge make_border_edge(const seam_finder *s, uint32_t from, uint32_t to, uint32_t triangle) {
+  double middle[3];
+  for (size_t k = 0; k < 3; k++) middle[k] = (position(s, from)[k] + position(s, to)[k]) / 2;
+  return (border_edge){floor(qmat_dot(across_strips, middle) / s->tolerance), qmat_dot(along_strips, middle), from, to,
+                       triangle};
 }
 
 static qmat_status find_border(seam_finder *s) {
@@ -77,9 +85,7 @@ static qmat_status find_border(seam_finder *s) {
       last = qmat_edge_last(&e, first);
       if (last - first > 1) continue;
       const uint32_t h = e.order[first], from = qmat_half_edge_start(&e, h), to = qmat_half_edge_end(&e, h);
-      if (pass == 1)
-        s->border[s->border_count] = (border_edge){
-            (qmat_dot(direction, position(s, from)) + qmat_dot(direction, position(s, to))) / 2, from, to, h / 3};
+      if (pass == 1) s->border[s->border_count] = make_border_edge(s, from, to, h / 3);
       s->border_count++;
     }
     if (pass == 0 && !(s->border = qmat_arena_alloc(&s->context->arena, s->border_count, sizeof *s->border)))
@@ -95,6 +101,15 @@ static double width_between(const seam_finder *s, const border_edge *a, const bo
   return fmax(distance(s, a->from, b->to), distance(s, a->to, b->from));
 }
 
+static void compare_edges(seam_finder *s, size_t i, size_t k, double *widths) {
+  const double width = width_between(s, &s->border[i], &s->border[k]);
+  if (!(width <= s->tolerance)) return;
+  if (width < widths[i]) widths[i] = width, s->nearest[i] = k;
+  if (width < widths[k]) widths[k] = width, s->nearest[k] = i;
+}
+
+/* The middles of two near edges are no farther apart than their ends: in one strip, or in two beside each other, as
+ * `across_strips` is shorter than 1. */
 static qmat_status find_nearest(seam_finder *s) {
   double *widths = qmat_arena_alloc(&s->context->arena, s->border_count, sizeof *widths);
   s->nearest = qmat_arena_alloc(&s->context->arena, s->border_count, sizeof *s->nearest);
@@ -103,12 +118,18 @@ static qmat_status find_nearest(seam_finder *s) {
     widths[i] = INFINITY;
     s->nearest[i] = SIZE_MAX;
   }
+  size_t next = 0; /* the first edge of the next strip that may be near */
   for (size_t i = 0; i < s->border_count; i++) {
-    for (size_t k = i + 1; k < s->border_count && s->border[k].along - s->border[i].along <= s->tolerance; k++) {
-      const double width = width_between(s, &s->border[i], &s->border[k]);
-      if (!(width <= s->tolerance)) continue;
-      if (width < widths[i]) widths[i] = width, s->nearest[i] = k;
-      if (width < widths[k]) widths[k] = width, s->nearest[k] = i;
+    const border_edge *edge = &s->border[i];
+    for (size_t k = i + 1; k < s->border_count && s->border[k].strip == edge->strip; k++) {
+      if (s->border[k].along - edge->along > s->tolerance) break;
+      compare_edges(s, i, k, widths);
+    }
+    const border_edge first = {.strip = edge->strip + 1, .along = edge->along - s->tolerance};
+    while (next < s->border_count && compare_border_edges(&s->border[next], &first) < 0) next++;
+    for (size_t k = next; k < s->border_count && s->border[k].strip == first.strip; k++) {
+      if (s->border[k].along - edge->along > s->tolerance) break;
+      compare_edges(s, i, k, widths);
     }
     const qmat_status status = qmat_progress(s->context, i, s->border_count, "border edges");
     if (status != QMAT_OK) return status;
