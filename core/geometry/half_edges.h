@@ -21,6 +21,11 @@ static inline uint32_t qmat_half_edge_end(const qmat_half_edges *e, uint32_t h) 
   return e->triangles[h % 3 == 2 ? h - 2 : h + 1];
 }
 
+/* The corner of its triangle across from it. */
+static inline uint32_t qmat_half_edge_across(const qmat_half_edges *e, uint32_t h) {
+  return e->triangles[h % 3 == 0 ? h + 2 : h - 1];
+}
+
 /* Whether it leads from the lower to the higher end. */
 static inline bool qmat_half_edge_rises(const qmat_half_edges *e, uint32_t h) {
   return qmat_half_edge_start(e, h) < qmat_half_edge_end(e, h);

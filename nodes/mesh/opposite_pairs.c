@@ -8,10 +8,6 @@
 /* Half-edges between two polls for a cancel. */
 enum { POLL = 65536 };
 
-static uint32_t third_corner(const uint32_t *triangles, uint32_t half_edge) {
-  return triangles[half_edge - half_edge % 3 + (half_edge + 2) % 3];
-}
-
 /* A triangle at the edge of its two lowest corners. */
 typedef struct wing {
   uint32_t third, triangle;
@@ -54,7 +50,7 @@ qmat_status qmat_find_opposite_pairs(qmat_context *context, size_t vertex_count,
     if (last - first > capacity && qmat_grow((void **)&wings, &capacity, last - first, sizeof *wings) != 0)
       status = qmat_fail_memory(context, "the opposite triangles");
     for (size_t i = first; status == QMAT_OK && i < last; i++) {
-      const uint32_t h = e.order[i], third = third_corner(e.triangles, h);
+      const uint32_t h = e.order[i], third = qmat_half_edge_across(&e, h);
       if (third > high) wings[found++] = (wing){third, h / 3, qmat_half_edge_rises(&e, h)};
     }
     pair_wings(wings, found, classes);

@@ -257,7 +257,7 @@ static void find_border_at(division *d, const edge_part *here, size_t count, boo
     for (last = first; last < count && here[last].part == part; last++) {
       const uint32_t h = here[last].half_edge;
       rising += qmat_half_edge_rises(e, h) ? 1 : -1;
-      third = e->triangles[h - h % 3 + (h + 2) % 3];
+      third = qmat_half_edge_across(e, h);
     }
     for (; rising != 0; rising += rising > 0 ? -1 : 1, d->border_count++)
       if (!counts_only)
@@ -398,15 +398,11 @@ static void add_cones(const division *d, qmat_part *part, const double *referenc
   for (size_t l = part->first_loop; l < part->first_loop + part->loop_count; l++) {
     const qmat_loop *loop = &d->parts->loops[l];
     const uint32_t *vertices = d->parts->loop_vertices + loop->first;
-    double centre[3], p[3], q[3], r[3], product[3];
+    double centre[3];
     loop_centre(d, loop, centre);
-    qmat_subtract(centre, reference, p);
     for (size_t i = 0; i < loop->count; i++) {
       const double *a = position(d, vertices[i]), *b = position(d, vertices[(i + 1) % loop->count]);
-      qmat_subtract(a, reference, q);
-      qmat_subtract(b, reference, r);
-      qmat_cross(q, r, product);
-      part->volume += qmat_dot(p, product) / 6;
+      part->volume += qmat_triangle_six_volumes(centre, a, b, reference) / 6;
       for (size_t s = 0; s < count; s++) winding[s] += qmat_seen_share(d->samples + 3 * s, centre, a, b);
     }
   }
@@ -434,12 +430,7 @@ static void judge_part(const division *d, qmat_part *part, const uint32_t *trian
   const double *reference = position(d, d->parts->triangles[3 * (size_t)triangles[0]]);
   for (size_t i = 0; i < part->triangle_count; i++) {
     const uint32_t *c = d->parts->triangles + 3 * (size_t)triangles[i];
-    double p[3], q[3], r[3], product[3];
-    qmat_subtract(position(d, c[0]), reference, p);
-    qmat_subtract(position(d, c[1]), reference, q);
-    qmat_subtract(position(d, c[2]), reference, r);
-    qmat_cross(q, r, product);
-    part->volume += qmat_dot(p, product) / 6;
+    part->volume += qmat_triangle_six_volumes(position(d, c[0]), position(d, c[1]), position(d, c[2]), reference) / 6;
     part->area += area_of(d, triangles[i]);
   }
   part->filled = 1;

@@ -57,18 +57,15 @@ static const double *corner(const side_finder *s, size_t t, size_t k) {
   return s->positions + 3 * (size_t)s->triangles[3 * t + k];
 }
 
-static const double *third_corner(const side_finder *s, uint32_t half_edge) {
-  return corner(s, half_edge / 3, (half_edge + 2) % 3);
-}
-
 /* ---- edges ---- */
 
 /* How far two triangles at an edge are from one half-plane: a third corner from the other's plane. Infinite if they lie
  * on two sides of the edge, or one has no plane. */
 static double distance_apart(const side_finder *s, const qmat_half_edges *e, uint32_t a, uint32_t b) {
   const double *from = s->positions + 3 * (size_t)qmat_half_edge_start(e, a),
-               *to = s->positions + 3 * (size_t)qmat_half_edge_end(e, a), *p = third_corner(s, a),
-               *q = third_corner(s, b);
+               *to = s->positions + 3 * (size_t)qmat_half_edge_end(e, a),
+               *p = s->positions + 3 * (size_t)qmat_half_edge_across(e, a),
+               *q = s->positions + 3 * (size_t)qmat_half_edge_across(e, b);
   double p_normal[3], q_normal[3], p_from[3], q_from[3];
   qmat_triangle_normal(from, to, p, p_normal);
   qmat_triangle_normal(from, to, q, q_normal);

@@ -74,35 +74,35 @@ static void test_a_limited_number_of_edits_is_tried_for_a_loop(void **state) {
   free_scene(&s);
 }
 
-/* The spheres of sheets are the first ones, so that no new sphere divides a slab of a sheet. */
+/* The spheres of sheets are the first ones, so that no new sphere divides a slab of a sheet. Makes four spheres with
+ * these simplices, as a solid's and as a sheet's, and counts the edits. */
+static void check_sheet(const uint32_t *edges, size_t edge_count, const uint32_t *walls, size_t wall_count,
+                        const double *spheres, size_t of_solid) {
+  for (size_t sheet = 0; sheet < 2; sheet++) {
+    scene s;
+    make_scene(&s, medial_mesh(spheres, 4, edges, edge_count, walls, wall_count));
+    s.result.medial->sheet_sphere_count = 4 * sheet;
+    assert_int_equal(
+        (walls ? qmat_simplification_open_voids : qmat_simplification_close_loops)(&s.simplification, &s.result),
+        QMAT_OK);
+    assert_int_equal(walls ? s.result.medial->triangle_count : s.result.medial->edge_count, 4);
+    assert_int_equal(s.edits, sheet ? 4 : of_solid);
+    free_scene(&s);
+  }
+}
+
 static void test_walls_of_sheets_are_not_divided(void **state) {
   (void)state;
   static const double spheres[] = {0.1, 0, 0, 0.01, 0, 0.1, 0, 0.01, 0, 0, 0.1, 0.01, 0, 0, 0, 0.01};
   static const uint32_t walls[] = {0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3};
-  for (size_t sheet = 0; sheet < 2; sheet++) {
-    scene s;
-    make_scene(&s, medial_mesh(spheres, 4, NULL, 0, walls, 4));
-    s.result.medial->sheet_sphere_count = 4 * sheet;
-    assert_int_equal(qmat_simplification_open_voids(&s.simplification, &s.result), QMAT_OK);
-    assert_int_equal(s.result.medial->triangle_count, 4);
-    assert_int_equal(s.edits, sheet ? 4 : 4 + 4 * QMAT_MOST_WALLS);
-    free_scene(&s);
-  }
+  check_sheet(NULL, 0, walls, 4, spheres, 4 + 4 * QMAT_MOST_WALLS);
 }
 
 static void test_edges_of_sheets_are_not_divided(void **state) {
   (void)state;
   static const double spheres[] = {0.1, 0, 0, 0.01, 0, 0.1, 0, 0.01, -0.1, 0, 0, 0.01, 0, -0.1, 0, 0.01};
   static const uint32_t edges[] = {0, 1, 1, 2, 2, 3, 0, 3};
-  for (size_t sheet = 0; sheet < 2; sheet++) {
-    scene s;
-    make_scene(&s, medial_mesh(spheres, 4, edges, 4, NULL, 0));
-    s.result.medial->sheet_sphere_count = 4 * sheet;
-    assert_int_equal(qmat_simplification_close_loops(&s.simplification, &s.result), QMAT_OK);
-    assert_int_equal(s.result.medial->edge_count, 4);
-    assert_int_equal(s.edits, sheet ? 4 : 4 + 4 * 4 * 2);
-    free_scene(&s);
-  }
+  check_sheet(edges, 4, NULL, 0, spheres, 4 + 4 * 4 * 2);
 }
 
 /* Edits remove no spheres: where another start has fewer, none is tried. */
