@@ -187,24 +187,24 @@ static qmat_status make_hulls_of_solid(work *w) {
 static const char *const fits[] = {"both", "contain", "inside", NULL};
 static const char *const kinds[] = {"any", "capsules", "spheres", "hulls", NULL};
 
+/* The lowest joint of a shape that is not below `least`; UINT32_MAX: there is none. */
+static uint32_t lowest_joint(const qmat_colliders *c, uint32_t least) {
+  uint32_t lowest = UINT32_MAX;
+  for (size_t i = 0; i < c->joint_count; i++)
+    if (c->joints[i] >= least && c->joints[i] < lowest) lowest = c->joints[i];
+  return lowest;
+}
+
 /* The number of shapes of each joint that has some: {"joint": 3, "shapes": 2}. NULL: no memory. */
 static json_t *count_by_joint(const qmat_colliders *c) {
   json_t *list = json_array();
-  uint32_t joint = 0;
-  for (bool more = list && c->joint_count > 0; more; joint++) {
-    size_t count = 0;
-    uint32_t next = UINT32_MAX;
-    for (size_t i = 0; i < c->joint_count; i++) {
-      count += c->joints[i] == joint;
-      if (c->joints[i] > joint && c->joints[i] < next) next = c->joints[i];
-    }
-    if (count > 0 && json_array_append_new(
-                         list, json_pack("{s:I, s:I}", "joint", (json_int_t)joint, "shapes", (json_int_t)count)) != 0) {
-      json_decref(list);
-      return NULL;
-    }
-    more = next != UINT32_MAX;
-    joint = next - 1;
+  for (uint32_t joint = lowest_joint(c, 0); list && joint != UINT32_MAX; joint = lowest_joint(c, joint + 1)) {
+    json_int_t count = 0;
+    for (size_t i = 0; i < c->joint_count; i++) count += c->joints[i] == joint;
+    if (json_array_append_new(list, json_pack("{s:I, s:I}", "joint", (json_int_t)joint, "shapes", count)) == 0)
+      continue;
+    json_decref(list);
+    return NULL;
   }
   return list;
 }
