@@ -11,6 +11,8 @@
 #include <map>
 #include <memory>
 
+#include "nodes/mesh/triangle_separation.h"
+
 namespace qmat {
 namespace {
 
@@ -373,8 +375,11 @@ bool do_meet(const UnionMesh &mesh, uint32_t a, uint32_t b) {
     std::swap(*found, q[shared]);
     std::swap(p[i], p[shared++]);
   }
-  const auto point = [&](uint32_t vertex) { return mesh.inexact(vertex); };
   if (shared == 3) return true;
+  const double *const first_corners[] = {mesh.position(p[0]), mesh.position(p[1]), mesh.position(p[2])};
+  const double *const second_corners[] = {mesh.position(q[0]), mesh.position(q[1]), mesh.position(q[2])};
+  if (qmat_triangles_are_separate(first_corners, second_corners, static_cast<int>(shared))) return false;
+  const auto point = [&](uint32_t vertex) { return mesh.inexact(vertex); };
   if (shared == 2) {
     return CGAL::coplanar(point(p[0]), point(p[1]), point(p[2]), point(q[2])) &&
            CGAL::coplanar_orientation(point(p[0]), point(p[1]), point(p[2]), point(q[2])) == CGAL::POSITIVE;
