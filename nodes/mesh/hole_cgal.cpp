@@ -5,6 +5,7 @@
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/utility.h>
 
+#include <algorithm>
 #include <exception>
 #include <new>
 #include <utility>
@@ -13,10 +14,16 @@
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Polygon = std::vector<Kernel::Point_3>;
 using Patch = std::vector<CGAL::Triple<int, int, int>>;
 
-/* The cubic search is for polygons of at most this many sides. */
-constexpr size_t kMostCubic = 500;
+/* Polygons of at most this many sides are searched in full. CGAL's quicker search among Delaunay triangles takes the
+ * first of equally good triangulations in an order that depends on where its memory is. */
+constexpr size_t kMostCubic = 200;
+
+/* Polygons whose corners are within this share of their size from a plane are triangulated in it. CGAL's default is a
+ * share of the least side of the bounding box, which is rounding alone for the end of an upright prism. */
+constexpr double kNearlyFlat = 0.01;
 
 /* Whether a triangle runs along the polygon; a side of the polygon decides. */
 bool runs_along(const Patch &patch, int count) {
@@ -31,14 +38,18 @@ bool runs_along(const Patch &patch, int count) {
   return true;
 }
 
-Patch triangulate(const std::vector<Kernel::Point_3> &points, const std::vector<Kernel::Point_3> &thirds) {
+Patch triangulate(const Polygon &points, const Polygon &thirds) {
   Patch patch;
   if (points.size() > 3) {
-    namespace parameters = CGAL::parameters;
+    const bool is_long = points.size() > kMostCubic;
+    const CGAL::Bbox_3 box = CGAL::bbox_3(points.begin(), points.end());
+    const double size = std::max({box.x_span(), box.y_span(), box.z_span()});
     CGAL::Polygon_mesh_processing::triangulate_hole_polyline(
         points, thirds, std::back_inserter(patch),
-        parameters::use_2d_constrained_delaunay_triangulation(true).do_not_use_cubic_algorithm(points.size() >
-                                                                                               kMostCubic));
+        CGAL::parameters::use_2d_constrained_delaunay_triangulation(true)
+            .threshold_distance(kNearlyFlat * size)
+            .use_delaunay_triangulation(is_long)
+            .do_not_use_cubic_algorithm(is_long));
   }
   if (patch.size() != points.size() - 2) {
     patch.clear();
@@ -52,7 +63,7 @@ Patch triangulate(const std::vector<Kernel::Point_3> &points, const std::vector<
 qmat_status qmat_triangulate_hole(qmat_context *context, const double *points, const double *thirds, size_t count,
                                   uint32_t *triangles) {
   try {
-    std::vector<Kernel::Point_3> polygon, around;
+    Polygon polygon, around;
     for (size_t i = 0; i < 3 * count; i += 3) {
       polygon.emplace_back(points[i], points[i + 1], points[i + 2]);
       around.emplace_back(thirds[i], thirds[i + 1], thirds[i + 2]);

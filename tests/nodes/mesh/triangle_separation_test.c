@@ -42,6 +42,7 @@ static void by_hand(void **state) {
   assert_true(are_separate(&a, &(triangle){{{0, 0, 0}, {1, 0, 0}, {0.3, -1, 0}}}, 2));
   assert_false(are_separate(&a, &(triangle){{{0, 0, 0}, {1, 0, 0}, {0.3, 2, 0}}}, 2));
   assert_false(are_separate(&a, &(triangle){{{0, 0, 0}, {1, 0, 0}, {0.3, 2, 0.1}}}, 2));
+  assert_false(are_separate(&a, &(triangle){{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}}, 2));
 }
 
 static void degenerate_triangles_are_not_separate(void **state) {
@@ -55,34 +56,36 @@ static void degenerate_triangles_are_not_separate(void **state) {
 }
 
 static double whole(random_numbers *random) {
-  return (double)random_index(random, 2001) - 1000;
+  return (double)random_index(random, 1 << 21) - (1 << 20);
 }
 
-/* Triangles of whole numbers that meet, at places and of sizes where the differences of coordinates are rounded. */
+/* Triangles of whole numbers that meet, of many sizes, some far from zero. Heights are rounded, corners are not. */
 static void triangles_that_meet_are_never_separate(void **state) {
   (void)state;
   random_numbers random = {.seed = 7};
   for (int i = 0; i < 20000; i++) {
-    const double unit = ldexp(1, (int)random_index(&random, 101) - 50), far = i % 3 == 0 ? 0x1p30 : 0;
+    const double unit = ldexp(1, (int)random_index(&random, 101) - 50), far = i % 7 == 0 ? 0x1p30 : 0;
     double v[4][3];
     for (int j = 0; j < 4; j++)
       for (int k = 0; k < 3; k++) v[j][k] = whole(&random);
     triangle a, b;
     for (int k = 0; k < 3; k++) {
-      const double corners[3][2][3] = {
+      const double corners[4][2][3] = {
           /* the same centre */
           {{v[0][k], v[1][k], -v[0][k] - v[1][k]}, {v[2][k], v[3][k], -v[2][k] - v[3][k]}},
           /* a corner, and the point in the middle of the edges across from it */
           {{0, v[0][k], v[1][k]}, {0, v[2][k], v[0][k] + v[1][k] - v[2][k]}},
           /* an edge, and the same side of it */
           {{0, v[0][k], v[1][k]}, {0, v[0][k], 3 * v[1][k] + (i % 5 - 2) * v[0][k]}},
+          /* a corner of one in the middle of an edge of the other, in a plane */
+          {{0, 2 * v[0][k], 2 * v[1][k]}, {v[0][k] + v[1][k], 3 * v[0][k] + v[1][k], v[0][k] + 3 * v[1][k]}},
       };
       for (int j = 0; j < 3; j++) {
-        a.corners[j][k] = unit * (far + corners[i % 3][0][j]);
-        b.corners[j][k] = unit * (far + corners[i % 3][1][j]);
+        a.corners[j][k] = unit * (far + corners[i % 4][0][j]);
+        b.corners[j][k] = unit * (far + corners[i % 4][1][j]);
       }
     }
-    assert_false(are_separate(&a, &b, i % 3));
+    assert_false(are_separate(&a, &b, i % 4 % 3));
   }
 }
 
