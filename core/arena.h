@@ -24,8 +24,8 @@ void *qmat_arena_calloc(qmat_arena *arena, size_t count, size_t size);
 /* Frees all memory of the arena, which is then empty and usable again. NULL is allowed. */
 void qmat_arena_uninit(qmat_arena *arena);
 
-/* Returns what the arena holds; the arena is then empty. For memory that is freed earlier than the rest, or later: the
- * caller puts it back, or owns it. */
+/* Returns what the arena holds; the arena is then empty. So that what follows can be freed before the rest: put it
+ * back with `qmat_arena_put_back`, or free it as an arena of your own. */
 qmat_arena qmat_arena_set_aside(qmat_arena *arena);
 
 /* Frees all memory of the arena, which then holds `aside` again. */

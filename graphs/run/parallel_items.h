@@ -12,7 +12,8 @@
  *
  * Returns QMAT_OK, or the status of the first item in order that failed, with its error in `context` and its index in
  * `*failed`: the same for any number of threads. Items after a failed one are stopped or not started. For
- * QMAT_CANCELLED (by the context's progress function) and QMAT_ERROR_MEMORY `*failed` is SIZE_MAX. */
+ * QMAT_CANCELLED (by the context's progress function) `*failed` is SIZE_MAX, and for QMAT_ERROR_MEMORY where no item
+ * was started. */
 qmat_status qmat_run_items(qmat_context *context, size_t count, const size_t *sizes, const char *unit,
                            qmat_item_fn *run, void *user, size_t *failed);
 
