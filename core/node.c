@@ -119,15 +119,15 @@ static bool float_in_range(const qmat_param *param, double value) {
   return isfinite(value) && value >= param->min && value <= param->max;
 }
 
-/* Whether the parameter is a length in metres, which is stored negated. */
-static bool is_in_meters(const qmat_param *param, double value) {
+bool qmat_param_in_meters(const qmat_param *param, double value) {
   return (param->flags & QMAT_PARAM_RELATIVE) && value < 0 && isfinite(value);
 }
 
 static bool has_meters(const qmat_node *node, const void *params) {
   for (size_t i = 0; i < qmat_param_count(node); i++) {
     const qmat_param *param = &node->params[i];
-    if (param->type == QMAT_PARAM_FLOAT && is_in_meters(param, *(const double *)const_slot(param, params))) return true;
+    if (param->type == QMAT_PARAM_FLOAT && qmat_param_in_meters(param, *(const double *)const_slot(param, params)))
+      return true;
   }
   return false;
 }
@@ -239,7 +239,7 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
     bool in_range = true;
     if (param->type == QMAT_PARAM_INT) in_range = int_in_range(param, *(const int64_t *)place);
     if (param->type == QMAT_PARAM_FLOAT)
-      in_range = is_in_meters(param, *(const double *)place) || float_in_range(param, *(const double *)place);
+      in_range = qmat_param_in_meters(param, *(const double *)place) || float_in_range(param, *(const double *)place);
     if (!in_range) {
       qmat_param_format(param, params, text, sizeof text);
       return fail_range(context, param, text);
@@ -285,7 +285,7 @@ static qmat_status resolve_lengths(qmat_context *context, const qmat_node *node,
   for (size_t i = 0; i < qmat_param_count(node); i++) {
     const qmat_param *param = &node->params[i];
     double *value = slot(param, params);
-    if (param->type != QMAT_PARAM_FLOAT || !is_in_meters(param, *value)) continue;
+    if (param->type != QMAT_PARAM_FLOAT || !qmat_param_in_meters(param, *value)) continue;
     char text[48];
     qmat_param_format(param, params, text, sizeof text);
     if (!(diagonal > 0 && isfinite(diagonal))) return fail_unit(context, param, text);
@@ -407,8 +407,8 @@ void qmat_param_format(const qmat_param *param, const void *params, char *text, 
       break;
     case QMAT_PARAM_FLOAT: {
       const double value = *(const double *)place;
-      qmat_format_number(is_in_meters(param, value) ? -value : value, text, size);
-      if (is_in_meters(param, value)) snprintf(text + strlen(text), size - strlen(text), "m");
+      qmat_format_number(qmat_param_in_meters(param, value) ? -value : value, text, size);
+      if (qmat_param_in_meters(param, value)) snprintf(text + strlen(text), size - strlen(text), "m");
       break;
     }
     case QMAT_PARAM_ENUM: {

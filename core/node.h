@@ -183,4 +183,7 @@ qmat_status qmat_params_check(qmat_context *context, const qmat_node *node, cons
 /* Writes the parameter's value as canonical text, which qmat_param_parse reads back to the same value. */
 void qmat_param_format(const qmat_param *param, const void *params, char *text, size_t size);
 
+/* Whether a stored number of the parameter is a length in metres, which is stored negated: "5mm" as -0.005. */
+bool qmat_param_in_meters(const qmat_param *param, double value);
+
 #endif

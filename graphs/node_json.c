@@ -27,7 +27,9 @@ json_t *qmat_param_json(const qmat_param *param, const void *params) {
     case QMAT_PARAM_INT:
       return json_integer((json_int_t) * (const int64_t *)place);
     case QMAT_PARAM_FLOAT:
-      return json_real(*(const double *)place);
+      if (!qmat_param_in_meters(param, *(const double *)place)) return json_real(*(const double *)place);
+      qmat_param_format(param, params, text, sizeof text);
+      return json_string(text);
     case QMAT_PARAM_ENUM:
       qmat_param_format(param, params, text, sizeof text);
       return json_string(text);
