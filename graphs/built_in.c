@@ -3,6 +3,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "graphs/graph_file.h"
 
@@ -24,6 +25,12 @@ const qmat_built_in_graph *qmat_built_in_graph_find(const char *name) {
       return &qmat_built_in_graphs[i];
   }
   return NULL;
+}
+
+const qmat_built_in_graph *qmat_built_in_graph_named(const char *name) {
+  struct stat about;
+  const bool is_file = stat(name, &about) == 0 && !S_ISDIR(about.st_mode);
+  return is_file ? NULL : qmat_built_in_graph_find(name);
 }
 
 qmat_status qmat_graph_read_built_in(qmat_context *context, const qmat_registry *registry,

@@ -567,7 +567,7 @@ qmat_status qmat_run_batch(qmat_context *context, qmat_invocation *invocation, c
 static bool names_graph(const char *argument) {
   const char *dot = strrchr(argument, '.');
   const bool ends = dot && (strcmp(dot, ".yaml") == 0 || strcmp(dot, ".yml") == 0 || strcmp(dot, ".json") == 0);
-  return ends || (access(argument, F_OK) != 0 && qmat_built_in_graph_find(argument));
+  return ends || qmat_built_in_graph_named(argument);
 }
 
 static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
