@@ -12,9 +12,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "core/json_text.h"
 #include "core/value_form.h"
-#include "graphs/cache/cache_key.h"
+#include "graphs/cache/cache_record.h"
 #include "io/bytes.h"
 
 static const char *const kind_folders[QMAT_CACHE_KIND_COUNT] = {"ac/", "cas/", "tmp/", "bad/"};
@@ -23,9 +22,6 @@ static const char tag_text[] =
     "Signature: 8a477f597d28d172789f06886806bc55\n"
     "# This folder is a cache of qmat: everything in it can be made again.\n"
     "# About cache directory tags: https://bford.info/cachedir/\n";
-
-/* A record's last line has the digest of its JSON. */
-static const char record_end[] = "\nsha256 ";
 
 /* ---- paths and files ---- */
 
@@ -42,11 +38,17 @@ static char *path_of_digest(const qmat_cache *cache, qmat_cache_kind kind, const
   return path_of(cache, kind, hex);
 }
 
-static void warn(qmat_cache *cache, const char *what, const char *path, int number) {
+static void warn_of(qmat_cache *cache, const char *failure, const char *path, int number) {
   const char *reason = strerrordesc_np(number);
   if (!*cache->warning)
-    snprintf(cache->warning, sizeof cache->warning, "cannot write to the cache: %s %s: %s", what, path,
+    snprintf(cache->warning, sizeof cache->warning, "cannot %s %s: %s", failure, path,
              reason ? reason : "unknown error");
+}
+
+static void warn(qmat_cache *cache, const char *what, const char *path, int number) {
+  char failure[64];
+  snprintf(failure, sizeof failure, "write to the cache: %s", what);
+  warn_of(cache, failure, path, number);
 }
 
 /* Makes a folder and its parents. */
@@ -145,9 +147,18 @@ static bool make_ready(qmat_cache *cache) {
   return cache->ready;
 }
 
-static bool read_file(const char *path, qmat_bytes *bytes) {
+/* Whether a file is there and may not be read, which is told. It is not damaged: another user may read it. */
+static bool is_unreadable(qmat_cache *cache, const char *path) {
+  const int file = path ? open(path, O_RDONLY | O_CLOEXEC) : -1, number = errno;
+  if (file >= 0) close(file);
+  if (!path || file >= 0 || number == ENOENT || number == ENOTDIR) return false;
+  warn_of(cache, "read the cache:", path, number);
+  return true;
+}
+
+static bool read_file(qmat_cache *cache, const char *path, qmat_bytes *bytes) {
   qmat_context nobody = {0}; /* a missing file is no error here */
-  return qmat_bytes_read_file(&nobody, path, bytes) == QMAT_OK;
+  return !is_unreadable(cache, path) && qmat_bytes_read_file(&nobody, path, bytes) == QMAT_OK;
 }
 
 /* ---- opening and closing ---- */
@@ -192,19 +203,6 @@ const char *qmat_cache_warning(const qmat_cache *cache) {
   return *cache->warning || !cache->remote ? cache->warning : qmat_remote_warning(cache->remote);
 }
 
-char *qmat_cache_default_folder(void) {
-  const char *base = getenv("XDG_CACHE_HOME"), *below = "/qmat";
-  if (!base || *base != '/') {
-    base = getenv("HOME");
-    below = "/.cache/qmat";
-  }
-  if (!base || *base != '/') return NULL;
-  size_t size = strlen(base) + strlen(below) + 1;
-  char *folder = qmat_alloc(size, 1);
-  if (folder) snprintf(folder, size, "%s%s", base, below);
-  return folder;
-}
-
 /* ---- reading ---- */
 
 static bool is_bad(const qmat_cache *cache, const qmat_digest *digest) {
@@ -214,33 +212,15 @@ static bool is_bad(const qmat_cache *cache, const qmat_digest *digest) {
 }
 
 /* Moves a damaged file to bad/. If that fails, the cache remembers it as damaged. */
-static void set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
+static bool set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
   char *from = path_of_digest(cache, kind, digest), *to = path_of_digest(cache, QMAT_CACHE_BAD, digest);
   bool moved = from && to && !cache->read_only && (rename(from, to) == 0 || unlink(from) == 0);
   qmat_free(from);
   qmat_free(to);
-  if (moved) return;
+  if (moved) return true;
   if (qmat_grow((void **)&cache->bad, &cache->bad_capacity, cache->bad_count + 1, sizeof *cache->bad) == 0)
     cache->bad[cache->bad_count++] = *digest;
-}
-
-/* A record's JSON, if its bytes are intact and belong to the key. */
-static json_t *parse_record(const uint8_t *bytes, size_t size, const qmat_digest *key) {
-  const size_t tail = sizeof record_end - 1 + 64 + 1;
-  qmat_digest wanted, digest;
-  char hex[65];
-  if (size <= tail || bytes[size - 1] != '\n') return NULL;
-  size_t length = size - tail;
-  if (memcmp(bytes + length, record_end, sizeof record_end - 1) != 0) return NULL;
-  memcpy(hex, bytes + size - 65, 64);
-  hex[64] = 0;
-  if (!qmat_digest_parse(hex, &wanted) || qmat_digest_of(bytes, length, &digest) != QMAT_OK ||
-      !qmat_digest_equal(&wanted, &digest))
-    return NULL;
-  json_t *record = json_loadb((const char *)bytes, length, JSON_REJECT_DUPLICATES, NULL);
-  if (qmat_key_digest(json_object_get(record, "key"), &digest) && qmat_digest_equal(&digest, key)) return record;
-  json_decref(record);
-  return NULL;
+  return false;
 }
 
 /* Stores bytes in the folder. */
@@ -261,7 +241,7 @@ static json_t *remote_record(qmat_cache *cache, const qmat_digest *key) {
   qmat_writer body = {0};
   json_t *record = NULL;
   if (qmat_remote_get(cache->remote, kind_folders[QMAT_CACHE_RECORD], key, most_size, &body)) {
-    record = parse_record(body.bytes, body.size, key);
+    record = qmat_record_parse(body.bytes, body.size, key);
     if (record)
       keep_bytes(cache, QMAT_CACHE_RECORD, key, body.bytes, body.size);
     else
@@ -275,8 +255,8 @@ json_t *qmat_cache_record(qmat_cache *cache, const qmat_digest *key) {
   qmat_bytes bytes = {0};
   char *path = path_of_digest(cache, QMAT_CACHE_RECORD, key);
   json_t *record = NULL;
-  if (path && !is_bad(cache, key) && read_file(path, &bytes)) {
-    record = parse_record(bytes.data, bytes.size, key);
+  if (path && !is_bad(cache, key) && read_file(cache, path, &bytes)) {
+    record = qmat_record_parse(bytes.data, bytes.size, key);
     if (!record) set_aside(cache, QMAT_CACHE_RECORD, key);
   }
   qmat_bytes_uninit(&bytes);
@@ -319,7 +299,7 @@ static qmat_value *local_value(qmat_cache *cache, const qmat_digest *digest, con
   qmat_value *value = NULL;
   qmat_bytes bytes = {0};
   char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
-  if (path && !is_bad(cache, digest) && read_file(path, &bytes)) {
+  if (path && !is_bad(cache, digest) && read_file(cache, path, &bytes)) {
     value = parse_value(bytes.data, bytes.size, digest, items);
     const list_items *list = items ? items->user : NULL;
     if (!value && !(list && list->missing)) set_aside(cache, QMAT_CACHE_BLOB, digest);
@@ -384,18 +364,17 @@ static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_diges
          qmat_remote_put(cache->remote, folder, digest, bytes, size);
 }
 
-/* Whether the cache has an intact blob. A damaged one is moved away, or the new value would not be stored. */
+/* Whether the cache has an intact blob, or one that may not be read. A damaged one is moved away, or the new value
+ * would not be stored. */
 static bool is_kept(qmat_cache *cache, const qmat_digest *digest, size_t size) {
-  if (!has_locally(cache, digest, size)) return false;
   qmat_digest found;
   char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
-  bool sound = path && qmat_digest_of_file(path, &found) == QMAT_OK && qmat_digest_equal(&found, digest);
+  const bool unreadable = is_unreadable(cache, path), there = !unreadable && has_locally(cache, digest, size);
+  const bool sound = there && path && qmat_digest_of_file(path, &found) == QMAT_OK && qmat_digest_equal(&found, digest);
   qmat_free(path);
-  if (sound)
-    touch(cache, QMAT_CACHE_BLOB, digest); /* as new as the record that is about to name it */
-  else
-    set_aside(cache, QMAT_CACHE_BLOB, digest);
-  return sound;
+  if (sound) touch(cache, QMAT_CACHE_BLOB, digest); /* as new as the record that is about to name it */
+  if (there && !sound) set_aside(cache, QMAT_CACHE_BLOB, digest);
+  return sound || unreadable;
 }
 
 /* Stores the serialised form of a value and returns its entry in a record. */
@@ -466,25 +445,14 @@ uint64_t qmat_cache_stored_size(const json_t *stored) {
 }
 
 bool qmat_cache_put_record(qmat_cache *cache, const qmat_digest *key, const json_t *record) {
-  qmat_digest digest;
-  char hex[66];
-  size_t length;
-  if (!qmat_cache_is_writable(cache)) return false;
-  char *text = qmat_json_text(record, JSON_COMPACT | JSON_SORT_KEYS, &length);
   qmat_writer writer = {0};
-  bool done = text && qmat_digest_of(text, length, &digest) == QMAT_OK;
+  bool done = qmat_cache_is_writable(cache) && qmat_record_write(record, &writer);
   if (done) {
-    qmat_digest_hex(&digest, hex);
-    qmat_put_bytes(&writer, text, length);
-    qmat_put_text(&writer, record_end);
-    qmat_put_text(&writer, hex);
-    qmat_put_text(&writer, "\n");
-    bool kept = !writer.failed && keep_bytes(cache, QMAT_CACHE_RECORD, key, writer.bytes, writer.size);
-    bool sent = !writer.failed && send_bytes(cache, QMAT_CACHE_RECORD, key, writer.bytes, writer.size);
+    const bool kept = keep_bytes(cache, QMAT_CACHE_RECORD, key, writer.bytes, writer.size);
+    const bool sent = send_bytes(cache, QMAT_CACHE_RECORD, key, writer.bytes, writer.size);
     done = kept || sent;
   }
   qmat_writer_uninit(&writer);
-  qmat_free(text);
   return done;
 }
 
@@ -676,7 +644,6 @@ static bool is_gone(const qmat_cache *cache, const qmat_cache_entry *entry) {
 
 static qmat_cache_health check_record(qmat_cache *cache, const qmat_cache_entry *entry) {
   json_t *record = qmat_cache_record(cache, &entry->digest);
-  if (!record) return is_gone(cache, entry) ? QMAT_CACHE_SOUND : QMAT_CACHE_BROKEN;
   const json_t *outputs = json_object_get(record, "outputs");
   qmat_cache_health health = QMAT_CACHE_SOUND;
   for (size_t i = 0; i < json_array_size(outputs); i++)
@@ -685,14 +652,29 @@ static qmat_cache_health check_record(qmat_cache *cache, const qmat_cache_entry 
   return health;
 }
 
-qmat_cache_health qmat_cache_check(qmat_cache *cache, const qmat_cache_entry *entry) {
-  if (entry->kind == QMAT_CACHE_RECORD) return check_record(cache, entry);
-  if (entry->kind != QMAT_CACHE_BLOB) return QMAT_CACHE_SOUND;
+/* Whether the file of an entry has the bytes that its name promises. */
+static bool is_intact(const qmat_cache_entry *entry, const char *path) {
   qmat_digest digest;
+  if (entry->kind == QMAT_CACHE_BLOB)
+    return qmat_digest_of_file(path, &digest) == QMAT_OK && qmat_digest_equal(&digest, &entry->digest);
+  qmat_context nobody = {0};
+  qmat_bytes bytes = {0};
+  json_t *record = NULL;
+  if (qmat_bytes_read_file(&nobody, path, &bytes) == QMAT_OK)
+    record = qmat_record_parse(bytes.data, bytes.size, &entry->digest);
+  const bool intact = record != NULL;
+  json_decref(record);
+  qmat_bytes_uninit(&bytes);
+  return intact;
+}
+
+qmat_cache_health qmat_cache_check(qmat_cache *cache, const qmat_cache_entry *entry) {
+  if (entry->kind > QMAT_CACHE_BLOB) return QMAT_CACHE_SOUND;
   char *path = path_of(cache, entry->kind, entry->name);
-  bool sound = path && qmat_digest_of_file(path, &digest) == QMAT_OK && qmat_digest_equal(&digest, &entry->digest);
+  const bool unreadable = is_unreadable(cache, path), intact = !unreadable && path && is_intact(entry, path);
   qmat_free(path);
-  if (sound || is_gone(cache, entry)) return QMAT_CACHE_SOUND;
-  set_aside(cache, entry->kind, &entry->digest);
-  return QMAT_CACHE_BROKEN;
+  if (unreadable) return QMAT_CACHE_UNREADABLE;
+  if (intact) return entry->kind == QMAT_CACHE_RECORD ? check_record(cache, entry) : QMAT_CACHE_SOUND;
+  if (is_gone(cache, entry)) return QMAT_CACHE_SOUND;
+  return set_aside(cache, entry->kind, &entry->digest) ? QMAT_CACHE_BROKEN : QMAT_CACHE_STUCK;
 }

@@ -15,9 +15,9 @@
  * A remote cache may hold the same files. Missing files are fetched from it into the folder; stored files go to both.
  *
  * Every file is written to tmp/, flushed and renamed, and blobs come before the record that names them, so every file
- * is complete. Readers take no lock and check every digest; a damaged file is moved to bad/ and counts as missing. A
- * failure of the cache never fails a run: the first one is reported in `warning`. One thread at a time uses a
- * qmat_cache. */
+ * is complete. Readers take no lock and check every digest; a damaged file is moved to bad/ and counts as missing. One
+ * that may not be read counts as missing and stays. A failure of the cache never fails a run: the first one is reported
+ * in `warning`. One thread at a time uses a qmat_cache. */
 
 typedef struct qmat_cache_options {
   const char *folder;
@@ -119,10 +119,15 @@ qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool 
 /* Deletes every file of the cache, but no foreign file. */
 qmat_cache_sweep qmat_cache_clear(qmat_cache *cache);
 
-typedef enum qmat_cache_health { QMAT_CACHE_SOUND, QMAT_CACHE_INCOMPLETE, QMAT_CACHE_BROKEN } qmat_cache_health;
+typedef enum qmat_cache_health {
+  QMAT_CACHE_SOUND,
+  QMAT_CACHE_INCOMPLETE, /* a record one of whose blobs is missing; it is never used */
+  QMAT_CACHE_BROKEN,     /* and moved to bad/ */
+  QMAT_CACHE_STUCK,      /* broken, and it could not be moved */
+  QMAT_CACHE_UNREADABLE  /* the system refuses to read it; nothing is known about its bytes */
+} qmat_cache_health;
 
-/* Checks a record or blob; a broken one is moved to bad/. A record is incomplete when one of its blobs is missing; it
- * is then never used. */
+/* Checks a record or blob; a broken one is moved to bad/. */
 qmat_cache_health qmat_cache_check(qmat_cache *cache, const qmat_cache_entry *entry);
 
 #endif

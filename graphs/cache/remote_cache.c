@@ -67,7 +67,7 @@ typedef struct transfer {
   qmat_writer *received;
   uint64_t most_size;
   const char *sent;
-  size_t left;
+  size_t sent_size, sent_so_far;
 } transfer;
 
 static size_t take_bytes(char *bytes, size_t one, size_t size, void *user) {
@@ -82,18 +82,18 @@ static size_t take_bytes(char *bytes, size_t one, size_t size, void *user) {
 static size_t give_bytes(char *bytes, size_t one, size_t size, void *user) {
   transfer *transfer = user;
   size *= one;
-  if (size > transfer->left) size = transfer->left;
-  memcpy(bytes, transfer->sent, size);
-  transfer->sent += size;
-  transfer->left -= size;
+  if (size > transfer->sent_size - transfer->sent_so_far) size = transfer->sent_size - transfer->sent_so_far;
+  if (size > 0) memcpy(bytes, transfer->sent + transfer->sent_so_far, size);
+  transfer->sent_so_far += size;
   return size;
 }
 
+/* A server that sends the body on to another address reads it again from its start. */
 static int rewind_bytes(void *user, curl_off_t offset, int origin) {
-  (void)user;
-  (void)offset;
-  (void)origin;
-  return CURL_SEEKFUNC_FAIL;
+  transfer *transfer = user;
+  if (origin != SEEK_SET || offset < 0 || (uint64_t)offset > transfer->sent_size) return CURL_SEEKFUNC_FAIL;
+  transfer->sent_so_far = (size_t)offset;
+  return CURL_SEEKFUNC_OK;
 }
 
 /* Prepares a request for URL/folder/digest. */
@@ -160,13 +160,14 @@ bool qmat_remote_has(qmat_remote_cache *remote, const char *folder, const qmat_d
 
 bool qmat_remote_put(qmat_remote_cache *remote, const char *folder, const qmat_digest *digest, const void *bytes,
                      size_t size) {
-  transfer transfer = {.sent = bytes, .left = size};
+  transfer transfer = {.sent = bytes, .sent_size = size};
   if (!qmat_remote_is_writable(remote) || !start(remote, folder, digest, &transfer)) return false;
   curl_easy_setopt(remote->curl, CURLOPT_UPLOAD, 1L);
   curl_easy_setopt(remote->curl, CURLOPT_INFILESIZE_LARGE, (curl_off_t)size);
   curl_easy_setopt(remote->curl, CURLOPT_READFUNCTION, give_bytes);
   curl_easy_setopt(remote->curl, CURLOPT_READDATA, &transfer);
   curl_easy_setopt(remote->curl, CURLOPT_SEEKFUNCTION, rewind_bytes);
+  curl_easy_setopt(remote->curl, CURLOPT_SEEKDATA, &transfer);
   long code = finish(remote);
   if (code >= 200 && code < 300) return true;
   /* A server that refuses PUT may still answer GET. */

@@ -7,7 +7,7 @@
 
 /* A shared cache on any HTTP server with GET, HEAD and PUT (nginx with WebDAV, cache servers for Bazel). URL/ac/KEY and
  * URL/cas/DIGEST have the same bytes as the files of a qmat_cache. The server is not trusted: readers check digests.
- * After the first missing or slow answer it is not used again. */
+ * After the first request that gets no answer, or one too slowly, it is not used again. */
 typedef struct qmat_remote_cache qmat_remote_cache;
 
 /* The URL for messages: user and password, everything before the last '@', become "***". */

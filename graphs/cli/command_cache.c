@@ -134,27 +134,37 @@ static qmat_status show(cache_call *call) {
 }
 
 static qmat_status verify(cache_call *call) {
-  size_t broken = 0, incomplete = 0, checked = 0;
+  static const char *const words[] = {[QMAT_CACHE_INCOMPLETE] = "incomplete, never used",
+                                      [QMAT_CACHE_BROKEN] = "broken, set aside",
+                                      [QMAT_CACHE_STUCK] = "broken, and it cannot be set aside",
+                                      [QMAT_CACHE_UNREADABLE] = "cannot be read"};
+  size_t broken = 0, incomplete = 0, unreadable = 0, checked = 0;
   /* From the end, where the blobs are: a record of a broken blob is then found incomplete. */
   for (size_t i = call->count; i-- > 0;) {
     const qmat_cache_entry *entry = &call->entries[i];
     if (entry->kind > QMAT_CACHE_BLOB) continue;
     qmat_cache_health health = qmat_cache_check(call->cache, entry);
     checked++;
-    broken += health == QMAT_CACHE_BROKEN;
+    broken += health == QMAT_CACHE_BROKEN || health == QMAT_CACHE_STUCK;
+    unreadable += health == QMAT_CACHE_UNREADABLE;
     incomplete += health == QMAT_CACHE_INCOMPLETE;
     if (health != QMAT_CACHE_SOUND && !call->json)
-      printf("%s %s: %s\n", entry->kind == QMAT_CACHE_RECORD ? "record" : "blob", entry->name,
-             health == QMAT_CACHE_BROKEN ? "broken, set aside" : "incomplete, never used");
+      printf("%s %s: %s\n", entry->kind == QMAT_CACHE_RECORD ? "record" : "blob", entry->name, words[health]);
   }
   qmat_status status = QMAT_OK;
   if (call->json)
-    status = qmat_print_json(call->context, json_pack("{s:I, s:I, s:I}", "checked", (json_int_t)checked, "broken",
-                                                      (json_int_t)broken, "incomplete", (json_int_t)incomplete));
+    status = qmat_print_json(
+        call->context, json_pack("{s:I, s:I, s:I, s:I}", "checked", (json_int_t)checked, "broken", (json_int_t)broken,
+                                 "incomplete", (json_int_t)incomplete, "unreadable", (json_int_t)unreadable));
+  else if (unreadable > 0)
+    printf("%zu checked, %zu broken, %zu incomplete, %zu that cannot be read\n", checked, broken, incomplete,
+           unreadable);
   else
     printf("%zu checked, %zu broken, %zu incomplete\n", checked, broken, incomplete);
   if (status == QMAT_OK && broken > 0)
     status = qmat_fail(call->context, QMAT_ERROR_IO, "%zu files of the cache were damaged", broken);
+  if (status == QMAT_OK && unreadable > 0)
+    status = qmat_fail(call->context, QMAT_ERROR_IO, "%zu files of the cache cannot be read", unreadable);
   return status;
 }
 
@@ -226,7 +236,7 @@ const qmat_command qmat_command_cache = {
         "stats: folder and size.\n"
         "ls: the results, with the start of their keys.\n"
         "show KEY: what a result depends on, and its outputs; the start of the key is enough.\n"
-        "verify: checks every file; the exit code is 1 if one was damaged.\n"
+        "verify: checks every file; the exit code is 1 if one was damaged or cannot be read.\n"
         "gc: deletes unused files, and the least recently used results above the size.\n"
         "clear: deletes everything.",
     .options = options,

@@ -1123,7 +1123,7 @@ static void test_checking_finds_what_is_broken_and_what_is_incomplete(void **sta
   run_once(f, "3");
   blob_path(f, 'a' + 'b' + 'c', path);
   damage(path, -6, false);
-  size_t health[3] = {0};
+  size_t health[QMAT_CACHE_UNREADABLE + 1] = {0};
   qmat_cache cache;
   qmat_cache_entry *entries;
   size_t count;
@@ -1134,6 +1134,53 @@ static void test_checking_finds_what_is_broken_and_what_is_incomplete(void **sta
   assert_int_equal(health[QMAT_CACHE_BROKEN], 1);
   assert_int_equal(health[QMAT_CACHE_INCOMPLETE], 1);
   assert_int_equal(health[QMAT_CACHE_SOUND], 4);
+  qmat_cache_close(&cache);
+}
+
+/* A link to itself is a file that cannot be read, also for root. */
+static void test_a_file_that_may_not_be_read_is_told_once_and_left_alone(void **state) {
+  fixture *f = *state;
+  char path[256];
+  struct stat about;
+  qmat_cache cache;
+  qmat_cache_entry *entries;
+  size_t count, unreadable = 0;
+  write_text(f->model, "abc");
+  run_once(f, "3");
+  blob_path(f, 3 * ('a' + 'b' + 'c'), path);
+  open_cache(f, &cache);
+  assert_true(qmat_cache_list(&cache, &entries, &count));
+  assert_int_equal(unlink(path), 0);
+  assert_int_equal(symlink(path, path), 0);
+  for (size_t i = 0; i < count; i++) unreadable += qmat_cache_check(&cache, &entries[i]) == QMAT_CACHE_UNREADABLE;
+  assert_int_equal(unreadable, 1);
+  assert_non_null(strstr(cache.warning, "cannot read the cache: "));
+  qmat_free(entries);
+  qmat_cache_close(&cache);
+  run_once(f, "3");
+  assert_true(f->result == 6 * ('a' + 'b' + 'c'));
+  assert_int_equal(lstat(path, &about), 0);
+  assert_true(S_ISLNK(about.st_mode));
+  assert_int_equal(count_entries(f, QMAT_CACHE_BAD), 0);
+}
+
+static void test_a_broken_record_is_found_and_set_aside(void **state) {
+  fixture *f = *state;
+  char path[256];
+  qmat_cache cache;
+  qmat_cache_entry *entries;
+  size_t count;
+  write_text(f->model, "abc");
+  run_once(f, "3");
+  open_cache(f, &cache);
+  assert_true(qmat_cache_list(&cache, &entries, &count));
+  assert_int_equal(entries[0].kind, QMAT_CACHE_RECORD);
+  snprintf(path, sizeof path, "%s/ac/%s", f->cache_folder, entries[0].name);
+  damage(path, -6, false);
+  assert_int_equal(qmat_cache_check(&cache, &entries[0]), QMAT_CACHE_BROKEN);
+  assert_int_equal(qmat_cache_check(&cache, &entries[0]), QMAT_CACHE_SOUND); /* it is gone */
+  assert_int_equal(count_entries(f, QMAT_CACHE_BAD), 1);
+  qmat_free(entries);
   qmat_cache_close(&cache);
 }
 
@@ -1186,6 +1233,8 @@ int main(void) {
       CASE(test_what_was_used_least_recently_is_deleted_first),
       CASE(test_temporaries_of_dead_writers_are_swept_and_others_stay),
       CASE(test_checking_finds_what_is_broken_and_what_is_incomplete),
+      CASE(test_a_file_that_may_not_be_read_is_told_once_and_left_alone),
+      CASE(test_a_broken_record_is_found_and_set_aside),
       CASE(test_the_folder_says_that_it_is_a_cache),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -116,6 +116,17 @@ for file in web/cas/* web/ac/*; do head -c 100000 /dev/zero >>"$file"; done
 run long
 rm -rf web && cp -r web.kept web
 
+# A server that sends what is put on to another address: the body is read again from its start.
+stop_server
+start_server 'location ~ ^/(ac|cas)/ { if ($request_method = PUT) { return 307 /stored$request_uri; } }
+  location /stored/ { alias '"$work/web/"'; dav_methods PUT; create_full_put_path on; }' || holds "nginx starts again" false
+rm -rf web && mkdir web
+run sent_on
+holds "no warning of a redirected store" test ! -s err.txt
+holds "all is stored behind the redirection" test "$(ls web/ac web/cas | wc -l)" -eq "$(ls web.kept/ac web.kept/cas | wc -l)"
+run sent_on2
+holds "what was sent on is found: $states" test "$states" = "hit "
+
 # A server that takes nothing, one that always says yes, one that fails.
 stop_server
 start_server "" || holds "nginx starts again" false
