@@ -298,7 +298,8 @@ static qmat_status read_input(graph_reader *reader, const qmat_tree_entry *entry
     input->param_count++;
     if (member) member = member->next;
   } while (member);
-  return QMAT_OK;
+  status = qmat_graph_check_input(reader->context, reader->graph, input);
+  return status == QMAT_OK ? status : at_mark(reader, entry->mark);
 }
 
 static qmat_status read_inputs(graph_reader *reader) {

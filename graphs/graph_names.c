@@ -101,7 +101,10 @@ static qmat_status split_reference(qmat_context *context, const qmat_graph *grap
   }
   char id[QMAT_GRAPH_NAME_SIZE];
   size_t length = (size_t)(dot - text);
-  if (length >= sizeof id) length = sizeof id - 1;
+  if (length >= sizeof id) {
+    return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' names no node: an id has at most %d letters",
+                     qmat_show(text).text, QMAT_GRAPH_NAME_SIZE - 1);
+  }
   memcpy(id, text, length);
   id[length] = 0;
   *rest = dot + 1;

@@ -123,6 +123,47 @@ static qmat_status try_param(qmat_context *context, const qmat_graph *graph, qma
   return status;
 }
 
+static bool takes(const qmat_graph *graph, qmat_graph_param at, const char *text) {
+  qmat_context nobody = {0}; /* a text that does not fit is no error here */
+  const bool fits = try_param(&nobody, graph, at, text) == QMAT_OK;
+  qmat_context_uninit(&nobody);
+  return fits;
+}
+
+static const qmat_param *param_at(const qmat_graph *graph, qmat_graph_param at) {
+  return &graph->nodes[at.node].type->params[at.param];
+}
+
+/* Whether one text fits both parameters, as far as their types and ranges tell. */
+static bool fit_together(const qmat_graph *graph, qmat_graph_param first, qmat_graph_param second) {
+  static const char *const truths[] = {"true", "false", "yes", "no", "on", "off", NULL};
+  const qmat_param *a = param_at(graph, first), *b = param_at(graph, second);
+  const bool a_chooses = a->type == QMAT_PARAM_ENUM || a->type == QMAT_PARAM_BOOL;
+  const bool b_chooses = b->type == QMAT_PARAM_ENUM || b->type == QMAT_PARAM_BOOL;
+  if (!a_chooses && b_chooses) return fit_together(graph, second, first);
+  if (a_chooses) {
+    const char *const *choices = a->type == QMAT_PARAM_ENUM ? a->choices : truths;
+    for (int i = 0; choices[i]; i++)
+      if (takes(graph, second, choices[i])) return true;
+    return false;
+  }
+  const bool a_counts = a->type == QMAT_PARAM_INT || a->type == QMAT_PARAM_FLOAT;
+  const bool b_counts = b->type == QMAT_PARAM_INT || b->type == QMAT_PARAM_FLOAT;
+  return !a_counts || !b_counts || (a->min <= b->max && b->min <= a->max);
+}
+
+qmat_status qmat_graph_check_input(qmat_context *context, const qmat_graph *graph, const qmat_graph_input *input) {
+  for (size_t i = 1; i < input->param_count; i++)
+    for (size_t k = 0; k < i; k++) {
+      const qmat_graph_param first = input->params[k], second = input->params[i];
+      if (fit_together(graph, first, second)) continue;
+      return qmat_fail(context, QMAT_ERROR_USAGE, "no value of input '%s' fits both '%s.%s' and '%s.%s'", input->name,
+                       graph->nodes[first.node].id, param_at(graph, first)->name, graph->nodes[second.node].id,
+                       param_at(graph, second)->name);
+    }
+  return QMAT_OK;
+}
+
 qmat_status qmat_graph_set_named(qmat_context *context, qmat_graph *graph, const char *name, const char *text) {
   qmat_graph_param single;
   const qmat_graph_param *params = NULL;

@@ -36,7 +36,11 @@ bool qmat_graph_output_of_ending(const qmat_graph *graph, const char *path, size
  * graph sets it. */
 qmat_status qmat_graph_check_params(qmat_context *context, const qmat_graph *graph);
 
-/* The same for one node with these parameters; no required one may be missing. */
+/* Refuses an input that can never be set, because it sets two parameters that take no value in common, as a number and
+ * a choice. QMAT_ERROR_USAGE names both. */
+qmat_status qmat_graph_check_input(qmat_context *context, const qmat_graph *graph, const qmat_graph_input *input);
+
+/* The same as qmat_graph_check_params for one node with these parameters; no required one may be missing. */
 qmat_status qmat_graph_check_node(qmat_context *context, const qmat_graph *graph, size_t node, const void *params);
 
 #endif

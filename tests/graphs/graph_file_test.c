@@ -195,6 +195,11 @@ static const mistake mistakes[] = {
      "'value'"},
     {"qmat: 1\ninputs: { n: { b: value } }\nnodes: { a: { type: test.number } }\n", 2, 16, "no node 'b'", "nodes: a"},
     {"qmat: 1\ninputs: { n: { a: { b: c } } }\nnodes: { a: { type: test.number } }\n", 2, 19, "single value", NULL},
+    {"qmat: 1\ninputs: { n: { a: value, b: negate } }\nnodes: { a: { type: test.number }, b: { type: test.number } }\n",
+     2, 11, "no value of input 'n' fits both 'a.value' and 'b.negate'", NULL},
+    {"qmat: 1\nnodes: { a: { type: test.number } }\n"
+     "outputs: { x: a234567890123456789012345678901234567890123456789012345678901234.number }\n",
+     3, 15, "names no node: an id has at most 63 letters", NULL},
     {"qmat: 1\ninputs: { n: {} }\nnodes: { a: { type: test.number } }\n", 2, 14, "single value", NULL},
     {"qmat: 1\ninputs: 3\nnodes: { a: { type: test.number } }\n", 2, 9, "has to be a mapping", "node.parameter"},
     {"qmat: 1\ninputs: { 'n n': a.value }\nnodes: { a: { type: test.number } }\n", 2, 11, "cannot name an input", NULL},
