@@ -90,6 +90,16 @@ static qmat_result finish(qmat_job *job, qmat_status status) {
   return result;
 }
 
+/* Refuses a NULL that a call cannot work with. */
+static qmat_status expect_given(qmat_context *context, const void *pointer, const char *what) {
+  return pointer ? QMAT_OK : qmat_fail(context, QMAT_ERROR_USAGE, "%s is NULL", what);
+}
+
+/* The same for an array of `count` elements: an empty one may be NULL. */
+static qmat_status expect_array(qmat_context *context, const void *array, size_t count, const char *what) {
+  return count > 0 ? expect_given(context, array, what) : QMAT_OK;
+}
+
 static const qmat_job_problem no_problem = {QMAT_RESULT_OK, "ok", "", "", "", "", -1, "", 0, 0, "", "", ""};
 static const qmat_job_problem no_memory = {
     QMAT_RESULT_FAILED,           "memory", "", "", "", "", -1, "", 0, 0, "not enough memory for a job", "",
@@ -128,8 +138,9 @@ qmat_result qmat_job_new(qmat_job **job) {
 qmat_result qmat_job_new_from_file(qmat_job **job, const char *path) {
   *job = new_job();
   if (!*job) return QMAT_RESULT_FAILED;
+  if (!path) return finish_new(*job, expect_given(&(*job)->context, path, "the path of the graph"));
   const qmat_registry registry = {qmat_nodes, qmat_node_count};
-  const qmat_built_in_graph *built_in = access(path, F_OK) == 0 ? NULL : qmat_built_in_graph_find(path);
+  const qmat_built_in_graph *built_in = qmat_built_in_graph_named(path);
   return finish_new(*job, built_in ? qmat_graph_read_built_in(&(*job)->context, &registry, built_in, &(*job)->graph)
                                    : qmat_graph_read_file(&(*job)->context, &registry, path, &(*job)->graph));
 }
@@ -165,7 +176,9 @@ void qmat_job_free(qmat_job *job) {
 
 qmat_result qmat_job_set(qmat_job *job, const char *assignment) {
   if (!job->loaded) return job->problem.result;
-  return finish(job, qmat_graph_assign(&job->context, &job->graph, assignment));
+  qmat_status status = expect_given(&job->context, assignment, "the assignment");
+  if (status == QMAT_OK) status = qmat_graph_assign(&job->context, &job->graph, assignment);
+  return finish(job, status);
 }
 
 static qmat_status make_mesh(qmat_context *context, const char *name, const double *positions, size_t vertex_count,
@@ -215,7 +228,8 @@ static qmat_status give(qmat_job *job, size_t node, size_t port, qmat_value *val
 
 /* Finds an output port that takes values of this type. */
 static qmat_status find_given_port(qmat_job *job, const char *port, qmat_value_type type, size_t *node, size_t *index) {
-  const qmat_status status = qmat_graph_find_port(&job->context, &job->graph, port, node, index);
+  qmat_status status = expect_given(&job->context, port, "the port");
+  if (status == QMAT_OK) status = qmat_graph_find_port(&job->context, &job->graph, port, node, index);
   if (status != QMAT_OK) return status;
   const qmat_value_type takes = job->graph.nodes[*node].type->outputs[*index].type;
   if (takes == type) return QMAT_OK;
@@ -228,6 +242,8 @@ qmat_result qmat_job_give_mesh(qmat_job *job, const char *port, const char *name
   if (!job->loaded) return job->problem.result;
   size_t node, index;
   qmat_status status = find_given_port(job, port, QMAT_MESH, &node, &index);
+  if (status == QMAT_OK) status = expect_array(&job->context, positions, vertex_count, "positions");
+  if (status == QMAT_OK) status = expect_array(&job->context, triangles, triangle_count, "triangles");
   if (status != QMAT_OK) return finish(job, status);
   const qmat_node *type = job->graph.nodes[node].type;
   if (!name || !*name) name = "mesh";
@@ -267,6 +283,9 @@ qmat_result qmat_job_give_medial(qmat_job *job, const char *port, const double *
   size_t node, index;
   qmat_medial *medial;
   qmat_status status = find_given_port(job, port, QMAT_MEDIAL, &node, &index);
+  if (status == QMAT_OK) status = expect_array(&job->context, spheres, sphere_count, "spheres");
+  if (status == QMAT_OK) status = expect_array(&job->context, edges, edge_count, "edges");
+  if (status == QMAT_OK) status = expect_array(&job->context, triangles, triangle_count, "triangles");
   if (status == QMAT_OK)
     status = make_medial(&job->context, spheres, sphere_count, edges, edge_count, triangles, triangle_count, &medial);
   if (status == QMAT_OK) status = give(job, node, index, &medial->base);
@@ -293,8 +312,10 @@ static qmat_status find_value(qmat_context *context, const qmat_job *job, const 
   size_t node, index, item;
   char plain[PORT_SIZE];
   *value = NULL;
+  qmat_status status = expect_given(context, port, "the port");
+  if (status != QMAT_OK) return status;
   if (!job->ran) return qmat_fail(context, QMAT_ERROR_USAGE, "the job has no results: run it first");
-  qmat_status status = split_item(context, port, plain, &item);
+  status = split_item(context, port, plain, &item);
   if (status == QMAT_OK) status = qmat_graph_find_port(context, &job->graph, plain, &node, &index);
   if (status != QMAT_OK) return status;
   const qmat_value *found = qmat_run_value(&job->run, node, index);
@@ -302,8 +323,10 @@ static qmat_status find_value(qmat_context *context, const qmat_job *job, const 
     qmat_fail(context, QMAT_ERROR_USAGE, "'%s' was not requested before the run", plain);
     return qmat_fail_hint(context, "qmat_job_want");
   }
-  if (item != SIZE_MAX) {
-    const size_t count = found->type == QMAT_LIST ? qmat_value_count(found) : 0;
+  if (item != SIZE_MAX && found->type != QMAT_LIST) {
+    if (item > 0) return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' has a single value, without item %zu", plain, item);
+  } else if (item != SIZE_MAX) {
+    const size_t count = qmat_value_count(found);
     if (item >= count)
       return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is a list of %zu items, without item %zu", plain, count, item);
     if (name) *name = ((const qmat_list *)found)->names[item];
@@ -321,7 +344,8 @@ qmat_result qmat_job_give_result(qmat_job *job, const char *port, const qmat_job
   if (!job->loaded) return job->problem.result;
   size_t node, index;
   const qmat_value *value;
-  qmat_status status = find_value(&job->context, from, from_port, &value, NULL);
+  qmat_status status = expect_given(&job->context, from, "the other job");
+  if (status == QMAT_OK) status = find_value(&job->context, from, from_port, &value, NULL);
   if (status == QMAT_OK) status = find_given_port(job, port, qmat_value_item_type(value), &node, &index);
   if (status == QMAT_OK) status = give(job, node, index, qmat_value_retain(value));
   return finish(job, status);
@@ -330,7 +354,8 @@ qmat_result qmat_job_give_result(qmat_job *job, const char *port, const qmat_job
 qmat_result qmat_job_want(qmat_job *job, const char *port) {
   if (!job->loaded) return job->problem.result;
   qmat_run_port want;
-  qmat_status status = qmat_graph_find_port(&job->context, &job->graph, port, &want.node, &want.port);
+  qmat_status status = expect_given(&job->context, port, "the port");
+  if (status == QMAT_OK) status = qmat_graph_find_port(&job->context, &job->graph, port, &want.node, &want.port);
   if (status == QMAT_OK &&
       qmat_grow((void **)&job->wants, &job->want_capacity, job->want_count + 1, sizeof *job->wants) != 0)
     status = qmat_fail_memory(&job->context, "ports");
@@ -359,8 +384,10 @@ qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path) {
   if (!job->loaded) return job->problem.result;
   job_save save = {0};
   int choice;
-  qmat_status status = output ? qmat_graph_find_output(&job->context, &job->graph, output, &save.output)
-                              : only_file(job, path, &save.output);
+  qmat_status status = expect_given(&job->context, path, "the path");
+  if (status == QMAT_OK)
+    status = output ? qmat_graph_find_output(&job->context, &job->graph, output, &save.output)
+                    : only_file(job, path, &save.output);
   if (status == QMAT_OK) status = qmat_graph_output_format(&job->context, &job->graph, save.output, path, &choice);
   for (size_t i = 0; i < job->save_count && status == QMAT_OK; i++) {
     if (strcmp(job->saves[i].path, path) != 0) continue;
@@ -529,7 +556,8 @@ qmat_result qmat_job_distances(qmat_job *job, const char *port, const double *po
   const qmat_medial *medial = result_value(job, port, QMAT_MEDIAL);
   if (!medial) return job->problem.result;
   qmat_envelope *envelope = NULL;
-  qmat_status status = QMAT_OK;
+  qmat_status status = expect_array(&job->context, points, count, "points");
+  if (status == QMAT_OK) status = expect_array(&job->context, distances, count, "distances");
   for (size_t i = 0; i < 3 * count && status == QMAT_OK; i++) {
     if (isfinite(points[i])) continue;
     qmat_fail(&job->context, QMAT_ERROR_GEOMETRY, "a coordinate is not finite");

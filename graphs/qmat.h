@@ -21,7 +21,9 @@
  *
  * Functions that can fail return a qmat_result; qmat_job_error then has the error. Positions are in the units of the
  * model. Texts are UTF-8 and are copied; numbers in texts are read without the locale. There is no global state:
- * different threads may use different jobs at the same time, one thread at a time uses a job. */
+ * different threads may use different jobs at the same time, one thread at a time uses a job. A pointer to a result,
+ * and the job itself, must not be NULL. A NULL text or array is QMAT_RESULT_USAGE where nothing says that it may be
+ * NULL. */
 
 #if defined(__GNUC__)
 #define QMAT_API __attribute__((visibility("default")))
@@ -139,8 +141,9 @@ QMAT_API qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress 
 /* ---- results ---- */
 /* Pointers are valid until the next run or the end of the job. Each call fails with QMAT_RESULT_USAGE when the port was
  * not requested before the run, has another type, or has one value per mesh of a glTF or USD scene. Such a list has
- * items, which a port may name: "simple.medial[0]". (Or set "model.mesh=NAME" to choose a mesh, or "model.mesh=merged"
- * to merge them.) An item that could not be made is QMAT_RESULT_FAILED with the reason. */
+ * items, which a port may name: "simple.medial[0]", which a single value has, too. (Or set "model.mesh=NAME" to choose
+ * a mesh, or "model.mesh=merged" to merge them.) An item that could not be made is QMAT_RESULT_FAILED with the reason.
+ */
 
 /* What a value is. */
 typedef struct qmat_value_view {

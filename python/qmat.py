@@ -409,14 +409,16 @@ def _value(job, port):
 
 
 class Results(Mapping):
-    """The results of a run by port ("simple.medial") or output ("asset"): `report` is that of the whole run."""
+    """The results of a run by port ("simple.medial") or output ("asset"): `report` is that of the whole run. A list has
+    items ("simple.medial[1]"); a single value is its own item 0."""
 
     def __init__(self, job, ports):
         self._job, self._ports, self._values = job, ports, {}
 
     def __getitem__(self, name):
         if name not in self._values:
-            self._values[name] = _value(self._job, self._ports[name])
+            whole, bracket, item = name.partition("[") if isinstance(name, str) else (name, "", "")
+            self._values[name] = _value(self._job, self._ports[whole] + bracket + item)
         return self._values[name]
 
     def __iter__(self):
@@ -615,8 +617,8 @@ def mat(V, F=None, *, epsilon=None, vertices=None, features=None, set=(), name=N
 
     epsilon: the largest distance between surface and envelope, as a share of the diagonal of the model's bounding box
     (.01), or a length ("5mm") where the file has a unit; arrays have none. vertices: the number of spheres to stop at.
-    Without epsilon it is the most that are left, at the least distance that so few allow; with epsilon more are left where
-    it takes more, and no fewer where fewer would do. features="sharp" keeps sharp edges. set: other parameters by name
+    Without epsilon, the result has at most this many spheres, at the least distance that they allow. With epsilon,
+    collapsing stops at this number; where epsilon needs more spheres, more are left. features="sharp" keeps sharp edges. set: other parameters by name
     ({"model.mesh": "merged"}); with arrays none of the node model, which does not run. cache, threads, progress: as those
     of Graph.
     """
@@ -641,6 +643,7 @@ def mat(V, F=None, *, epsilon=None, vertices=None, features=None, set=(), name=N
     results = graph.run("simple.medial", "errors.report", "solid.mesh", "model.scene", threads=threads,
                         progress=progress)
     if isinstance(results["simple.medial"], list):
-        # The library says how many there are, and how to choose one.
-        results._job.call(_lib.qmat_job_medial, b"simple.medial", _ffi.new("qmat_medial_view *"))
+        message = f"the scene has {len(results['simple.medial'])} meshes, and mat() describes one"
+        hint = 'qmat.mat(..., set={"model.mesh": "merged"}), or the name of a mesh there; qmat.Graph describes each'
+        raise UsageError(f"{message} ({hint})", status="usage", message=message, hint=hint)
     return MedialMesh(results, settings, cache)

@@ -267,7 +267,11 @@ static void test_values_are_given_read_and_passed_on(void **state) {
   assert_int_equal(qmat_job_error(second)->element, 1);
   const uint32_t beyond[] = {0, 2};
   assert_int_equal(qmat_job_give_medial(second, "given.medial", capsule, 2, beyond, 1, NULL, 0), QMAT_RESULT_FAILED);
-  assert_int_equal(qmat_job_value(second, "given.medial[0]", &value), QMAT_RESULT_USAGE);
+  ok(second, qmat_job_value(second, "given.medial[0]", &value)); /* a single value is its own item 0 */
+  assert_string_equal(value.type, "medial");
+  assert_int_equal(value.item_count, 0);
+  assert_int_equal(qmat_job_value(second, "given.medial[1]", &value), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(second)->text, "'given.medial' has a single value, without item 1"));
   assert_int_equal(qmat_job_value(second, "given.medial[x]", &value), QMAT_RESULT_USAGE);
   assert_int_equal(qmat_job_value(second, "given.medial[0", &value), QMAT_RESULT_USAGE);
   assert_int_equal(qmat_job_value(second, "given.medial[18446744073709551615]", &value), QMAT_RESULT_USAGE);
@@ -406,6 +410,34 @@ static void test_the_cache_folder_follows_the_environment(void **state) {
     free(exchange(names[k], before[k]));
     free(before[k]);
   }
+}
+
+static void test_a_null_that_a_call_cannot_work_with_is_a_usage_error(void **state) {
+  (void)state;
+  qmat_job *job, *none;
+  static const double positions[] = {0, 0, 0};
+  static const uint32_t triangles[] = {0, 0, 0};
+  ok(job, qmat_job_new(&job));
+  assert_int_equal(qmat_job_set(job, NULL), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "the assignment is NULL"));
+  assert_int_equal(qmat_job_want(job, NULL), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "the port is NULL"));
+  assert_int_equal(qmat_job_save(job, NULL, NULL), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "the path is NULL"));
+  assert_int_equal(qmat_job_save(job, "asset", NULL), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_give_mesh(job, "model.mesh", NULL, NULL, 3, triangles, 1), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "positions is NULL"));
+  assert_int_equal(qmat_job_give_mesh(job, "model.mesh", NULL, positions, 1, NULL, 1), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "triangles is NULL"));
+  assert_int_equal(qmat_job_give_mesh(job, NULL, NULL, positions, 1, triangles, 1), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_give_medial(job, "simple.medial", NULL, 1, NULL, 0, NULL, 0), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "spheres is NULL"));
+  assert_int_equal(qmat_job_give_medial(job, "simple.medial", positions, 0, NULL, 1, NULL, 0), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_give_result(job, "model.mesh", NULL, "model.mesh"), QMAT_RESULT_USAGE);
+  assert_int_equal(qmat_job_new_from_file(&none, NULL), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(none)->text, "the path of the graph is NULL"));
+  qmat_job_free(none);
+  qmat_job_free(job);
 }
 
 static void test_mistakes_are_results_with_a_problem(void **state) {
@@ -557,6 +589,7 @@ int main(void) {
       cmocka_unit_test(test_values_are_given_read_and_passed_on),
       cmocka_unit_test(test_items_of_a_list_are_read_one_by_one_and_one_that_failed_says_why),
       cmocka_unit_test(test_the_cache_folder_follows_the_environment),
+      cmocka_unit_test(test_a_null_that_a_call_cannot_work_with_is_a_usage_error),
       cmocka_unit_test(test_mistakes_are_results_with_a_problem),
       cmocka_unit_test(test_a_bad_graph_keeps_its_error),
       cmocka_unit_test(test_a_job_takes_from_the_cache_what_another_has_made),

@@ -247,6 +247,12 @@ class OfFiles(InAFolder):
         with self.assertRaises(qmat.UsageError) as raised:
             qmat.mat("scene.gltf", epsilon=.05, set={"model.defects": "drop"})
         self.assertIn("merged", raised.exception.hint)
+        self.assertIn('set={"model.mesh": "merged"}', str(raised.exception))
+
+        # An item may be named; the only value of a port is its item 0.
+        np.testing.assert_array_equal(found["simple.medial[0]"].spheres, medials[0].spheres)
+        self.assertAlmostEqual(qmat.Graph(text=OF_SPHERES).give("given.medial", medials[1]).run()["skin[0]"]
+                               .vertices[:, 0].max(), 8, delta=.5)
 
     def test_a_second_run_is_from_the_cache(self):
         for hits in (False, True):
