@@ -77,20 +77,21 @@ qmat_status qmat_progress_view_init(qmat_context *context, const char *mode, qma
 
 /* ---- a line of JSON ---- */
 
-static void print_event(const qmat_progress_view *view, const char *event, json_t *more) {
-  json_t *line = json_object();
-  json_object_set_new(line, "event", json_string(event));
-  json_object_set_new(line, "node", json_string(view->id));
-  json_object_set_new(line, "type", json_string(view->type));
-  json_object_set_new(line, "step", json_integer((json_int_t)view->step + 1));
-  json_object_set_new(line, "steps", json_integer((json_int_t)view->step_count));
-  if (more) json_object_update(line, more);
+/* Prints an object as one line, and releases it. */
+static void print_line(json_t *line) {
   char *text = qmat_json_text(line, JSON_COMPACT | JSON_REAL_PRECISION(9), NULL);
   /* One write, so that lines stay whole when other processes write to the same terminal. */
   if (text) fprintf(stderr, "%s\n", text);
   qmat_free(text);
   json_decref(line);
+}
+
+static void print_event(const qmat_progress_view *view, const char *event, json_t *more) {
+  json_t *line = json_pack("{s:s, s:s, s:s, s:I, s:I}", "event", event, "node", view->id, "type", view->type, "step",
+                           (json_int_t)view->step + 1, "steps", (json_int_t)view->step_count);
+  if (more) json_object_update(line, more);
   json_decref(more);
+  print_line(line);
 }
 
 /* ---- a line on a terminal ---- */
@@ -247,7 +248,9 @@ static void on_started(void *user, const qmat_run *run, size_t step) {
 static void on_done(void *user, const qmat_run *run, size_t step) {
   qmat_progress_view *view = user;
   if (view->mode == QMAT_PROGRESS_JSON)
-    print_event(view, "done", json_pack("{s:f}", "seconds", run->steps[step].seconds));
+    print_event(view, "done",
+                json_pack("{s:s, s:f}", "cache", qmat_step_state_name(run->steps[step].state), "seconds",
+                          run->steps[step].seconds));
 }
 
 void qmat_progress_view_connect(qmat_progress_view *view, qmat_context *context, qmat_run_observer *observer) {
@@ -259,4 +262,13 @@ void qmat_progress_view_connect(qmat_progress_view *view, qmat_context *context,
 void qmat_progress_view_end(qmat_progress_view *view) {
   if (view->line_open) fputs("\r\x1b[K", stderr);
   view->line_open = false;
+}
+
+void qmat_progress_view_finish(const qmat_progress_view *view, const qmat_run *run, qmat_status status) {
+  if (view->mode != QMAT_PROGRESS_JSON) return;
+  json_t *outputs = json_array();
+  for (size_t i = 0; i < run->file_count && status == QMAT_OK; i++)
+    json_array_append_new(outputs, qmat_json_string(run->files[i].path));
+  print_line(json_pack("{s:s, s:s, s:f, s:o}", "event", "end", "status", qmat_status_name(status), "seconds",
+                       run->seconds, "outputs", outputs));
 }

@@ -56,6 +56,10 @@ void qmat_progress_view_connect(qmat_progress_view *view, qmat_context *context,
 /* Erases the line. */
 void qmat_progress_view_end(qmat_progress_view *view);
 
+/* The last event of a run, where events are printed: its status ("ok", or that of the error), and the paths of the
+ * files that it saved. `run` may be empty. */
+void qmat_progress_view_finish(const qmat_progress_view *view, const qmat_run *run, qmat_status status);
+
 /* Holds SIGHUP, SIGINT, SIGQUIT and SIGTERM back until qmat_catch_interrupts, also in the program that this one
  * becomes. */
 void qmat_hold_interrupts(void);
