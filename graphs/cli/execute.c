@@ -85,7 +85,7 @@ static qmat_status prepare_save(qmat_context *context, qmat_invocation *invocati
 
 static qmat_status plan(qmat_context *context, qmat_invocation *invocation, bool foresee, qmat_planned_run *planned) {
   qmat_run_options options = {.saves = planned->saves,
-                              .may_lack_params = foresee,
+                              .foresee = foresee,
                               .to_node = qmat_invocation_value(invocation, "to"),
                               .cache = planned->cached ? &planned->cache : NULL,
                               .forced = planned->forced};
@@ -163,7 +163,7 @@ void qmat_planned_run_uninit(qmat_planned_run *planned) {
 
 qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *invocation) {
   const char *name = invocation->arguments[0], *path = name;
-  const qmat_built_in_graph *built_in = access(name, F_OK) == 0 ? NULL : qmat_built_in_graph_find(name);
+  const qmat_built_in_graph *built_in = qmat_built_in_graph_named(name);
   if (built_in) return qmat_graph_read_built_in(context, &invocation->registry, built_in, &invocation->graph);
   qmat_status status = strcmp(name, "-") == 0 ? qmat_streams_read(context, &invocation->streams, &path) : QMAT_OK;
   if (status == QMAT_OK)
@@ -235,6 +235,25 @@ static qmat_status check_files(qmat_context *context, const qmat_invocation *inv
   return QMAT_OK;
 }
 
+/* Makes the folders of the report and the depfile, which are written after the run, and refuses what can be refused
+ * before it. Either path may be NULL. */
+static qmat_status prepare_later_files(qmat_context *context, const qmat_invocation *invocation, const qmat_run *run,
+                                       const char *report, const char *depfile) {
+  const bool make = !run->foreseen;
+  qmat_status status = QMAT_OK;
+  if (report && make) status = qmat_make_folders(context, report);
+  if (status == QMAT_OK && report) status = qmat_run_check_path(context, run, "the report", report);
+  if (status == QMAT_OK && depfile && make) status = qmat_make_folders(context, depfile);
+  if (status == QMAT_OK && depfile) status = qmat_run_check_path(context, run, "the depfile", depfile);
+  if (status == QMAT_OK && depfile && qmat_run_count_saved(run, invocation->streams.folder) == 0) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "option '--depfile' needs an output that is saved to a file");
+    status = qmat_fail_hint(context, "-o FILE");
+  }
+  if (status == QMAT_OK && report && depfile && qmat_same_file(depfile, report))
+    status = qmat_fail(context, QMAT_ERROR_USAGE, "the depfile '%s' would overwrite the report", depfile);
+  return status;
+}
+
 qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
                          qmat_status (*prepare)(qmat_context *context, qmat_invocation *invocation),
                          void (*finished)(void *user, const qmat_graph *graph, const qmat_run *run), void *user) {
@@ -254,13 +273,9 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   if (status == QMAT_OK) status = qmat_invocation_number(context, invocation, "jobs", 1, 1024, &context->threads);
   if (status == QMAT_OK) status = qmat_invocation_number(context, invocation, "threads", 0, 1024, &context->threads);
   if (status == QMAT_OK) status = qmat_plan_invocation(context, invocation, prepare, dry, &planned);
-  if (status == QMAT_OK && report_path) status = qmat_make_folders(context, report_path);
-  if (status == QMAT_OK && report_path) status = qmat_run_check_path(context, run, "the report", report_path);
-  if (status == QMAT_OK && depfile) status = qmat_make_folders(context, depfile);
-  if (status == QMAT_OK && depfile) status = qmat_run_check_path(context, run, "the depfile", depfile);
-  if (status == QMAT_OK && report_path && depfile && qmat_same_file(depfile, report_path))
-    status = qmat_fail(context, QMAT_ERROR_USAGE, "the depfile '%s' would overwrite the report", depfile);
+  if (status == QMAT_OK) status = prepare_later_files(context, invocation, run, report_path, depfile);
   bool ready = status == QMAT_OK, reported = false;
+  char names[512] = ""; /* a warning about the names of files */
   if (ready && dry) {
     qmat_run_foresee(run);
     qmat_print_plan(run, verbose, stdout);
@@ -276,10 +291,13 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
       if (status != QMAT_OK) report_path = NULL; /* nor may the error be written there */
     }
     if (status == QMAT_OK && depfile) status = qmat_run_check_later_file(context, run, "the depfile", depfile);
+    if (status == QMAT_OK && depfile)
+      status = qmat_run_check_depfile(context, run, invocation->streams.folder, names, sizeof names);
     if (status == QMAT_OK) status = qmat_run_write(context, run);
     if (status == QMAT_OK) status = finish_stream(context, invocation, run);
   }
-  if (status == QMAT_OK && depfile && !dry) status = qmat_run_write_depfile(context, run, depfile);
+  if (status == QMAT_OK && depfile && !dry)
+    status = qmat_run_write_depfile(context, run, depfile, invocation->streams.folder);
   if (status == QMAT_OK && report_path && !dry) {
     json_t *report = qmat_run_report(context, run);
     qmat_streams_name_in(&invocation->streams, report);
@@ -301,8 +319,10 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
     context->error = error;
   }
   if (ready && !dry) print_warnings(run, quiet);
+  if (*names && !quiet) fprintf(stderr, "qmat: warning: %s\n", names);
   const char *warning = planned.cached ? qmat_cache_warning(&planned.cache) : "";
   if (*warning && !quiet) fprintf(stderr, "qmat: warning: %s\n", warning);
+  if (!dry) qmat_progress_view_finish(&view, run, status);
   if (finished) finished(user, &invocation->graph, run);
   qmat_planned_run_uninit(&planned);
   return status;

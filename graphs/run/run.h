@@ -2,6 +2,8 @@
 #ifndef QMAT_GRAPHS_RUN_RUN_H
 #define QMAT_GRAPHS_RUN_RUN_H
 
+#include <time.h>
+
 #include "graphs/cache/cache.h"
 #include "graphs/graph.h"
 
@@ -75,9 +77,10 @@ typedef struct qmat_run_slot {
 typedef struct qmat_run_file {
   size_t output, slot;
   char *path;
-  size_t bytes;       /* of the main part */
-  qmat_digest sha256; /* of the main part's bytes */
-  qmat_file *written; /* the file to save, with its side files; NULL: not made yet */
+  size_t bytes;            /* of the main part */
+  qmat_digest sha256;      /* of the main part's bytes */
+  qmat_file *written;      /* the file to save, with its side files; NULL: not made yet */
+  struct timespec planned; /* when the run was planned, by the clock of the file's folder: before any input was read */
 } qmat_run_file;
 
 /* A file that a run reads, with its digest at the first reading. A file is hashed once. */
@@ -97,6 +100,7 @@ typedef struct qmat_run {
   qmat_run_given *given;        /* given[i] is in slots[slot_count - given_count + i] */
   qmat_cache *cache;            /* NULL: none */
   bool bypass;                  /* ignore the cache's records: one of them was wrong */
+  bool foreseen;                /* planned for qmat_run_foresee only: no folder is made */
   qmat_run_file_digest *hashed; /* the files that were read or that keys contain */
   size_t hashed_count, hashed_capacity;
   char name[128]; /* of the first scene that was made or given; else of the graph file */

@@ -113,14 +113,15 @@ static bool same_folder(const char *a, const char *b) {
   return length == qmat_folder_length(b) && memcmp(a, b, length) == 0;
 }
 
-/* Makes an output and its side files as new as the run. Files with the same bytes are not written again; build tools go
- * by their times. */
+/* Dates an output and its side files, also those with the same bytes as before, from the start of the run. Build tools
+ * go by these times: what is edited during the run is newer than its output. */
 static qmat_status touch_file(qmat_context *context, const qmat_run_file *file) {
-  (void)utimensat(AT_FDCWD, file->path, NULL, 0);
+  const struct timespec times[2] = {{.tv_nsec = UTIME_NOW}, file->planned};
+  (void)utimensat(AT_FDCWD, file->path, times, 0);
   for (size_t part = 1; part < file->written->part_count; part++) {
     char *side = qmat_path_beside(file->path, file->written->parts[part].name);
     if (!side) return qmat_fail_memory(context, "output path");
-    (void)utimensat(AT_FDCWD, side, NULL, 0);
+    (void)utimensat(AT_FDCWD, side, times, 0);
     qmat_free(side);
   }
   return QMAT_OK;

@@ -58,21 +58,25 @@ qmat_status qmat_run_check_not_input(qmat_context *context, const qmat_run *run,
   return QMAT_OK;
 }
 
-/* Whether a file can be made in a folder. For root access() allows all, also where a file system has no files to make,
- * such as /proc. */
-static bool can_make_file(const char *folder) {
+/* Whether a file can be made in a folder, and the time that it gets. For root access() allows all, also where a file
+ * system has no files to make, such as /proc. */
+static bool can_make_file(const char *folder, struct timespec *now) {
+  struct stat info;
   char name[4200];
   if (access(folder, W_OK | X_OK) != 0) return false;
   if (snprintf(name, sizeof name, "%s/.qmat-XXXXXX", folder) >= (int)sizeof name) return true; /* writing will tell */
   const int file = mkstemp(name);
   if (file < 0) return false;
+  if (fstat(file, &info) == 0) *now = info.st_mtim;
   close(file);
   unlink(name);
   return true;
 }
 
-qmat_status qmat_check_can_write(qmat_context *context, const char *path) {
+static qmat_status check_can_write(qmat_context *context, const char *path, struct timespec *now) {
   struct stat info;
+  struct timespec time;
+  clock_gettime(CLOCK_REALTIME, &time);
   qmat_status status = QMAT_OK;
   char *folder = folder_of(path);
   if (!folder) return qmat_fail_memory(context, "output path");
@@ -80,12 +84,29 @@ qmat_status qmat_check_can_write(qmat_context *context, const char *path) {
     qmat_fail(context, status = QMAT_ERROR_IO, "cannot use the output folder: %s", strerror(errno));
   else if (!S_ISDIR(info.st_mode))
     qmat_fail(context, status = QMAT_ERROR_IO, "the output folder is a file");
-  else if (!can_make_file(folder))
+  else if (!can_make_file(folder, &time))
     qmat_fail(context, status = QMAT_ERROR_IO, "cannot write to the output folder: %s", strerror(errno));
   else if (stat(path, &info) == 0 && S_ISDIR(info.st_mode))
     qmat_fail(context, status = QMAT_ERROR_IO, "the output path is a folder");
   qmat_free(folder);
+  if (now) *now = time;
   return status == QMAT_OK ? status : qmat_fail_at(context, path, 0, 0);
+}
+
+qmat_status qmat_run_check_can_write(qmat_context *context, const qmat_run *run, const char *path,
+                                     struct timespec *now) {
+  if (!run->foreseen) return check_can_write(context, path, now);
+  struct stat info;
+  char *first = qmat_strdup(path); /* its first missing folder, else the file */
+  if (!first) return qmat_fail_memory(context, "output path");
+  for (char *slash = first; (slash = strchr(slash + 1, '/'));) {
+    *slash = 0;
+    if (stat(first, &info) != 0) break;
+    *slash = '/';
+  }
+  const qmat_status status = check_can_write(context, first, now);
+  qmat_free(first);
+  return status;
 }
 
 qmat_status qmat_make_folders(qmat_context *context, const char *path) {
@@ -106,5 +127,5 @@ qmat_status qmat_run_check_path(qmat_context *context, const qmat_run *run, cons
     if (qmat_same_file(path, run->files[i].path))
       status = qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite output '%s'", what, path,
                          run->graph->outputs[run->files[i].output].name);
-  return status == QMAT_OK ? qmat_check_can_write(context, path) : status;
+  return status == QMAT_OK ? qmat_run_check_can_write(context, run, path, NULL) : status;
 }

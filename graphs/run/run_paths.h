@@ -18,10 +18,13 @@ bool qmat_same_file(const char *a, const char *b);
 /* Refuses a path that is the graph file or a file that a step reads; `what` names it in the error. QMAT_ERROR_USAGE. */
 qmat_status qmat_run_check_not_input(qmat_context *context, const qmat_run *run, const char *what, const char *path);
 
-/* Whether a file can be written at `path`, so that a long run does not fail at its end. QMAT_ERROR_IO. */
-qmat_status qmat_check_can_write(qmat_context *context, const char *path);
+/* Checks that a file can be written at `path`, so that a long run does not fail at its end. A missing folder is an
+ * error. For a run that is only foreseen it may still be made: the first missing one is checked. `*now` (may be NULL)
+ * is the time that a file made now in the folder gets. QMAT_ERROR_IO. */
+qmat_status qmat_run_check_can_write(qmat_context *context, const qmat_run *run, const char *path,
+                                     struct timespec *now);
 
-/* Makes the missing folders of the file `path`. A folder that cannot be made is reported by qmat_check_can_write.
+/* Makes the missing folders of the file `path`. A folder that cannot be made is reported by qmat_run_check_can_write.
  * QMAT_ERROR_MEMORY. */
 qmat_status qmat_make_folders(qmat_context *context, const char *path);
 

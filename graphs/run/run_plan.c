@@ -165,7 +165,7 @@ static qmat_status add_step(run_planner *planner, size_t index, int format) {
   if (status != QMAT_OK) return status;
   const qmat_param *param = qmat_output_format_param(node->type);
   if (param) memcpy((char *)step->params + param->offset, &format, sizeof format);
-  step->missing = planner->options->may_lack_params ? qmat_graph_missing_param(node) : NULL;
+  step->missing = planner->options->foresee ? qmat_graph_missing_param(node) : NULL;
   if (step->missing) return QMAT_OK;
   return qmat_graph_check_node(planner->context, planner->graph, index, step->params);
 }
@@ -278,7 +278,7 @@ static void name_run(qmat_run *run) {
 
 qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const qmat_run_options *options,
                           qmat_run *run) {
-  *run = (qmat_run){.graph = graph, .cache = options->cache};
+  *run = (qmat_run){.graph = graph, .cache = options->cache, .foreseen = options->foresee};
   run_planner planner = {.context = context, .graph = graph, .options = options, .run = run};
   planner.within = qmat_calloc(graph->node_count, sizeof *planner.within);
   planner.replaced = qmat_calloc(graph->node_count, sizeof *planner.replaced);
@@ -311,9 +311,9 @@ qmat_status qmat_run_plan(qmat_context *context, const qmat_graph *graph, const 
     char what[QMAT_GRAPH_NAME_SIZE + 16];
     snprintf(what, sizeof what, "output '%s':", graph->outputs[run->files[i].output].name);
     status = qmat_run_check_not_input(context, run, what, run->files[i].path);
-    if (status == QMAT_OK && graph->outputs[run->files[i].output].path)
+    if (status == QMAT_OK && graph->outputs[run->files[i].output].path && !run->foreseen)
       status = qmat_make_folders(context, run->files[i].path);
-    if (status == QMAT_OK) status = qmat_check_can_write(context, run->files[i].path);
+    if (status == QMAT_OK) status = qmat_run_check_can_write(context, run, run->files[i].path, &run->files[i].planned);
   }
 cleanup:
   qmat_free(planner.formats);

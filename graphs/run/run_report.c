@@ -230,17 +230,76 @@ static bool is_dependency(const qmat_run *run, size_t index) {
   return true;
 }
 
-qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, const char *path) {
+static bool is_temporary(const char *path, const char *temporary) {
+  const size_t length = temporary ? strlen(temporary) : 0;
+  return length > 0 && strncmp(path, temporary, length) == 0 && path[length] == '/';
+}
+
+/* The files of a rule in their order: `index` counts the saved ones first, then the graph file, then those that were
+ * read. False at the end. `*path` is NULL for one that is left out. */
+static bool depfile_path(const qmat_run *run, const char *temporary, size_t index, const char **path, bool *saved) {
+  *saved = index < run->file_count;
+  *path = NULL;
+  if (*saved) {
+    if (strcmp(run->files[index].path, "-") != 0) *path = run->files[index].path;
+  } else if (index == run->file_count) {
+    if (run->graph->is_file) *path = run->graph->file;
+  } else {
+    index -= run->file_count + 1;
+    if (index >= run->hashed_count) return false;
+    if (is_dependency(run, index)) *path = run->hashed[index].path;
+  }
+  if (*path && is_temporary(*path, temporary)) *path = NULL;
+  return true;
+}
+
+size_t qmat_run_count_saved(const qmat_run *run, const char *temporary) {
+  size_t count = 0;
+  for (size_t i = 0; i < run->file_count; i++) count += !is_temporary(run->files[i].path, temporary);
+  return count;
+}
+
+qmat_status qmat_run_check_depfile(qmat_context *context, const qmat_run *run, const char *temporary, char *warning,
+                                   size_t size) {
+  const char *path;
+  bool saved;
+  *warning = 0;
+  for (size_t i = 0; depfile_path(run, temporary, i, &path, &saved); i++) {
+    if (!path) continue;
+    const char *problem = strpbrk(path, ";|\t\n\r");
+    if (problem) {
+      qmat_fail(context, QMAT_ERROR_USAGE, "neither Make nor Ninja can read the name '%s' in a depfile",
+                qmat_show(path).text);
+      return qmat_fail_hint(context, "give the file a name without ; | and control characters");
+    }
+    /* Ninja takes [ and ] as they are, and a backslash before them as part of the name. Make does too where no other
+     * file fits the pattern. */
+    problem = strpbrk(path, "=*?&<>\"'`^");
+    if (problem && !*warning)
+      snprintf(warning, size, "the depfile has the name '%s': %s", qmat_show(path).text,
+               *problem == '=' ? "Make does not see when the file changes, because of the ="
+                               : "Ninja makes the output at every build, because of the special character");
+  }
+  return QMAT_OK;
+}
+
+qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, const char *path,
+                                   const char *temporary) {
   qmat_writer writer = {0}, rules = {0};
   qmat_file *file = NULL;
-  for (size_t i = 0; i < run->file_count; i++) {
-    if (i > 0) qmat_put_text(&writer, " ");
-    put_escaped(&writer, run->files[i].path);
+  const char *name;
+  bool saved, in_targets = true;
+  for (size_t i = 0; depfile_path(run, temporary, i, &name, &saved); i++) {
+    if (!saved && in_targets) qmat_put_text(&writer, ":");
+    in_targets = saved;
+    if (!name) continue;
+    if (saved) {
+      if (writer.size > 0) qmat_put_text(&writer, " ");
+      put_escaped(&writer, name);
+    } else {
+      put_dependency(&writer, &rules, name);
+    }
   }
-  qmat_put_text(&writer, ":");
-  if (run->graph->is_file) put_dependency(&writer, &rules, run->graph->file);
-  for (size_t i = 0; i < run->hashed_count; i++)
-    if (is_dependency(run, i)) put_dependency(&writer, &rules, run->hashed[i].path);
   qmat_put_text(&writer, "\n");
   qmat_put_bytes(&writer, rules.bytes, rules.size);
   writer.failed |= rules.failed;

@@ -250,6 +250,21 @@ expect 0 "" "$qmat" mat box.off -o quiet.ma --quiet --epsilon 5% $coarse
 holds "nothing is printed with --quiet" test ! -s out.txt -a ! -s err.txt
 expect 0 '"event":"done"' "$qmat" mat box.off -o json.ma --progress json --epsilon 5% $coarse
 holds "JSON progress starts every node" test "$(grep -c '"event":"start"' err.txt)" -eq 11
+holds "JSON progress says where results come from" test "$(grep -c '"event":"done".*"cache":"run"' err.txt)" -eq 11
+holds "JSON progress ends with the files" sh -c "tail -n 1 err.txt | grep -q '^{\"event\":\"end\",\"status\":\"ok\",.*\"outputs\":\[\"json.ma\"\]}$'"
+expect 2 '{"event":"end","status":"usage",' "$qmat" mat box.off -o json.ma --progress json --set asset.require=nothing
+# Lengths in a report are as they are given.
+expect 0 "" "$qmat" mat box.off -o length.ma --set model.unit=m --epsilon 5cm $coarse --report length.json --quiet
+holds "a length in a report" grep -q '"epsilon": "0.05m"' length.json
+# A folder of the name of a built-in graph does not hide it, and foreseeing a run makes no folder.
+mkdir colliders
+expect 0 "" "$qmat" run colliders --set model=box.off --dry-run -o not/yet/a.glb
+expect 0 "" "$qmat" check qmat_plus
+expect 0 "" "$qmat" mat box.off -o not/yet/a.glb --dry-run --report not/r.json --depfile not/a.d
+expect 0 "" "$qmat" dot qmat_plus --set model=box.off --status --cache dotted
+holds "no folder is made" test ! -e not
+expect 1 "cannot use the output folder: Not a directory" "$qmat" mat box.off -o box.off/a.glb --dry-run
+rmdir colliders
 cat >cage.usda <<'END'
 #usda 1.0
 def Mesh "cage" {

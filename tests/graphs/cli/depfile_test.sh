@@ -38,6 +38,41 @@ for tool in make ninja; do
   made no "after an edited side file"
 done
 
+# A model that has just been edited is not newer than what is made of it.
+for tool in make ninja; do
+  for width in 5 6 7 8; do
+    printf '\000\000%b\100' "\\$((width * 20 + 60))" | dd of=roof.bin bs=1 seek=12 conv=notrunc status=none
+    $tool >out.txt 2>err.txt || die "$tool: an edited side file"
+    $tool >out.txt 2>err.txt || die "$tool: again"
+    holds "$tool: nothing to do at once after an edit" grep -q 'up to date\|no work to do' out.txt
+  done
+done
+
+# A model that is edited during the run is newer than what is made of it.
+fine="$qmat mat long.off -o long.ma --quiet --progress json --epsilon 1% --set samples.spacing=0.6% --depfile long.d"
+printf 'long.ma:\n\t%s 2>events.txt\n-include long.d\n' "$fine" >Makefile.long
+printf 'rule mat\n  command = %s 2>events.txt\n  depfile = long.d\nbuild long.ma: mat\n' "$fine" >long.ninja
+for tool in "make -f Makefile.long" "ninja -f long.ninja"; do
+  rm -f long.ma long.d events.txt
+  write_box long.off 8
+  $tool >out.txt 2>err.txt &
+  building=$!
+  tries=0
+  until grep -q '"event":"start","node":"solid"' events.txt 2>/dev/null || [ $tries -ge 600 ]; do
+    sleep 0.05
+    tries=$((tries + 1))
+  done
+  sleep 0.05 # file systems have a clock of their own, which ticks
+  write_box long.off 9
+  holds "$tool: the model is edited before the end" kill -0 $building
+  wait $building || die "$tool: a long run"
+  holds "$tool: the output is older than the edited model" test long.off -nt long.ma
+  $tool >out.txt 2>err.txt || die "$tool: after an edit during the run"
+  holds "$tool: the edited model is made" test long.ma -nt long.off
+  $tool >out.txt 2>err.txt || die "$tool: after that"
+  holds "$tool: it is made once" grep -q 'up to date\|no work to do' out.txt
+done
+
 # A missing image is looked for at each build, until it appears; then it may go again. So may the model, which is told.
 # Make still makes a model by a pattern.
 for tool in make ninja; do
@@ -97,6 +132,19 @@ for tool in make ninja; do
   $tool >out.txt 2>err.txt || die "$tool: the model has changed"
   holds "$tool: a changed model is seen" test odd.ma -nt again
 done
+
+# Names that one of the two cannot read are told; those that neither can are refused before anything is written.
+cp box.off 'a=b.off'
+cp box.off 'a;b.off'
+expect 0 "Make does not see when the file changes" "$qmat" mat 'a=b.off' -o told.ma --epsilon 10% --depfile told.d
+expect 2 "neither Make nor Ninja can read the name 'a;b.off'" "$qmat" mat 'a;b.off' -o never.ma --depfile never.d
+holds "nothing is written" test ! -e never.ma -a ! -e never.d
+
+# What came from the standard input is no dependency, and what goes to the standard output is no target.
+expect 0 "" sh -c "$qmat mat - -o piped.ma --quiet --epsilon 10% --depfile piped.d <box.off"
+holds "the standard input is not in the rule" test "$(cat piped.d)" = "piped.ma:"
+expect 2 "needs an output that is saved to a file" "$qmat" mat box.off -o - --format ma --depfile piped.d
+expect 2 "needs an output that is saved to a file" "$qmat" run qmat_plus --set model=box.off --depfile piped.d
 
 # Results with the same bytes as before are as new as the run: of two, both.
 "$qmat" mat roof.gltf -o two.ma -o two.ply --quiet --epsilon 10% --set samples.spacing=10%
