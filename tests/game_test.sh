@@ -25,8 +25,25 @@ for generator in Ninja "Unix Makefiles"; do
   echo 'qmat_add_asset(TARGET game GRAPH colliders INPUT models/crate.off OUTPUT assets/crate.urdf SET epsilon=5%)' \
     >>game/CMakeLists.txt
   cmake -G "$generator" -S game -B build -DCMAKE_PREFIX_PATH="$work/moved" >out.txt 2>&1 || die "$generator: configuring"
+  # Two assets of one file name; a graph by default, and one without an ending; side files.
+  cp game/spheres.yaml game/spheres
+  cat >>game/CMakeLists.txt <<'END'
+qmat_add_asset(TARGET more INPUT models/crate.off OUTPUT one/same.ply SET epsilon=10%)
+qmat_add_asset(TARGET more INPUT models/roof.gltf GRAPH spheres OUTPUT two/same.ply SET epsilon=10%)
+qmat_add_asset(TARGET more INPUT models/crate.off OUTPUT one-same.ply SET epsilon=10%)
+qmat_add_asset(TARGET more INPUT models/roof.gltf OUTPUT sides/roof.gltf SIDE_OUTPUTS roof.bin SET epsilon=10%)
+END
+  cmake build >out.txt 2>&1 || die "$generator: more assets"
   make_assets
   [ "$made" = "crate.ma roof.ma " ] || die "$generator: the first build made '$made'"
+  for file in one/same.ply two/same.ply one-same.ply sides/roof.gltf sides/roof.bin; do
+    [ -s build/$file ] || die "$generator: $file is missing"
+  done
+  if [ "$generator" = Ninja ]; then
+    rm build/sides/roof.bin
+    make_assets
+    [ -s build/sides/roof.bin ] || die "$generator: a side file is not made again"
+  fi
   grep -q '<robot' build/assets/crate.urdf || die "$generator: the asset of a built-in graph"
   build/game >out.txt || die "$generator: the game"
   grep -q '^crate: [1-9]' out.txt || die "$generator: the game has no colliders"
