@@ -134,8 +134,9 @@ typedef bool (*qmat_job_progress)(void *user, const char *node, const char *type
                                   const char *unit);
 
 /* Runs the job on `threads` threads (0: one per processor). `progress` may be NULL. Files are written only after every
- * node has succeeded. A job may be changed and run again, which frees what the earlier run returned. The results are
- * the same bytes for any number of threads. */
+ * node has succeeded, and get the time at which the run started: what is edited meanwhile is newer. A job may be
+ * changed and run again, which frees what the earlier run returned. The results are the same bytes for any number of
+ * threads. */
 QMAT_API qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress, void *user);
 
 /* ---- results ---- */
