@@ -40,8 +40,8 @@ done
 
 # A model that has just been edited is not newer than what is made of it.
 for tool in make ninja; do
-  for width in 5 6 7 8; do
-    printf '\000\000%b\100' "\\$((width * 20 + 60))" | dd of=roof.bin bs=1 seek=12 conv=notrunc status=none
+  for byte in 200 210 220 230; do # 4, 4.25, 4.5, 4.75
+    printf "\\000\\000\\$byte\\100" | dd of=roof.bin bs=1 seek=12 conv=notrunc status=none
     $tool >out.txt 2>err.txt || die "$tool: an edited side file"
     $tool >out.txt 2>err.txt || die "$tool: again"
     holds "$tool: nothing to do at once after an edit" grep -q 'up to date\|no work to do' out.txt
@@ -49,22 +49,24 @@ for tool in make ninja; do
 done
 
 # A model that is edited during the run is newer than what is made of it.
-fine="$qmat mat long.off -o long.ma --quiet --progress json --epsilon 1% --set samples.spacing=0.6% --depfile long.d"
+fine="echo \$\$\$\$ >pid.txt; exec $qmat mat long.off -o long.ma --quiet --progress json --epsilon 1% --set samples.spacing=0.3% --depfile long.d"
 printf 'long.ma:\n\t%s 2>events.txt\n-include long.d\n' "$fine" >Makefile.long
 printf 'rule mat\n  command = %s 2>events.txt\n  depfile = long.d\nbuild long.ma: mat\n' "$fine" >long.ninja
 for tool in "make -f Makefile.long" "ninja -f long.ninja"; do
-  rm -f long.ma long.d events.txt
+  rm -f long.ma long.d events.txt pid.txt
   write_box long.off 8
   $tool >out.txt 2>err.txt &
   building=$!
   tries=0
   until grep -q '"event":"start","node":"solid"' events.txt 2>/dev/null || [ $tries -ge 600 ]; do
-    sleep 0.05
+    sleep 0.02
     tries=$((tries + 1))
   done
-  sleep 0.05 # file systems have a clock of their own, which ticks
+  kill -STOP "$(cat pid.txt)"
+  sleep 0.1 # file systems have a clock of their own, which ticks
+  holds "$tool: the model is edited before the end" test ! -e long.ma
   write_box long.off 9
-  holds "$tool: the model is edited before the end" kill -0 $building
+  kill -CONT "$(cat pid.txt)"
   wait $building || die "$tool: a long run"
   holds "$tool: the output is older than the edited model" test long.off -nt long.ma
   $tool >out.txt 2>err.txt || die "$tool: after an edit during the run"
@@ -114,11 +116,11 @@ rm -f Makefile build.ninja
 
 # Names with what Make and Ninja read as something else.
 for tool in make ninja; do
-  name='at 12:30 #2.off'
+  name='at 12:30 #2[b].off'
   sed 's/^8 6 0/8 6 0/' "$work/box.off" >"$name"
-  printf 'all: odd.ma\nodd.ma:\n\t%s mat "at 12:30 #2.off" -o odd.ma --quiet --set samples.spacing=10%% --depfile odd.d\n-include odd.d\n' \
+  printf 'all: odd.ma\nodd.ma:\n\t%s mat "at 12:30 #2[b].off" -o odd.ma --quiet --set samples.spacing=10%% --depfile odd.d\n-include odd.d\n' \
     "$qmat" >Makefile
-  printf 'rule mat\n  command = %s mat "at 12:30 #2.off" -o odd.ma --quiet --set samples.spacing=10%% --depfile odd.d\n  depfile = odd.d\nbuild odd.ma: mat\n' \
+  printf 'rule mat\n  command = %s mat "at 12:30 #2[b].off" -o odd.ma --quiet --set samples.spacing=10%% --depfile odd.d\n  depfile = odd.d\nbuild odd.ma: mat\n' \
     "$qmat" >build.ninja
   rm -f odd.ma odd.d
   touch before
