@@ -81,6 +81,17 @@ qmat_status qmat_usd_prim_fail(const qmat_usd_prim *prim, const char *format, ..
   return qmat_fail_at(context, prim->log->file, 0, 0);
 }
 
+qmat_status qmat_usd_warn_of_error(const qmat_usd_prim *prim, const char *what, const qmat_error *before) {
+  qmat_context *context = prim->log->context;
+  char message[sizeof context->error.message], path[PATH_TEXT];
+  const char *shown = path_of(prim, path), *text = message;
+  memcpy(message, context->error.message, sizeof message);
+  if (strncmp(text, shown, strlen(shown)) == 0 && strncmp(text + strlen(shown), ": ", 2) == 0)
+    text += strlen(shown) + 2;
+  context->error = *before;
+  return qmat_usd_warn(prim, "%s: %s", what, text);
+}
+
 qmat_status qmat_usd_fail_prim_memory(const qmat_usd_prim *prim) {
   return qmat_fail_memory(prim->log->context, "a composed prim");
 }

@@ -56,6 +56,10 @@ qmat_status qmat_usd_warn(const qmat_usd_prim *prim, const char *format, ...) __
 qmat_status qmat_usd_prim_fail(const qmat_usd_prim *prim, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
+/* Turns the error that qmat_usd_prim_fail has recorded about the prim into a warning, "what: the error's text", and
+ * puts the error `before` back. QMAT_ERROR_MEMORY. */
+qmat_status qmat_usd_warn_of_error(const qmat_usd_prim *prim, const char *what, const qmat_error *before);
+
 /* QMAT_ERROR_MEMORY about composing a prim. */
 qmat_status qmat_usd_fail_prim_memory(const qmat_usd_prim *prim);
 

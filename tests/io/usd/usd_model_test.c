@@ -270,6 +270,104 @@ static void test_broken_instancers_are_errors_that_name_the_prim(void **state) {
   release(&r);
 }
 
+/* Of a target that an edit repeats, the first counts where it prepends, and the last where it appends. */
+static void test_targets_that_an_edit_repeats_count_once(void **state) {
+  (void)state;
+  static const struct {
+    const char *edit;
+    bool large_is_first;
+    size_t kinds;
+  } cases[] = {
+      {"prepend rel prototypes = [</p/large>, </p/large>]", true, 1},
+      {"prepend rel prototypes = [</p/large>, </p/small>, </p/large>]", true, 2},
+      {"append rel prototypes = [</p/large>, </p/small>, </p/large>]", false, 2},
+      {"add rel prototypes = [</p/large>, </p/small>, </p/large>]", true, 2},
+      {"rel prototypes = [</p/large>, </p/small>, </p/large>]", true, 3}, /* in the order of protoIndices */
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    char text[1024];
+    for (size_t index = 0; index <= cases[i].kinds; index++) {
+      snprintf(text, sizeof text,
+               "#usda 1.0\ndef PointInstancer \"p\" {\n%s\nint[] protoIndices = [%zu]\n"
+               "point3f[] positions = [(0, 0, 0)]\n" CUBE("small", "") CUBE("large", "double size = 4") "}\n",
+               cases[i].edit, index);
+      reading r = read_choice(text, "all");
+      assert_int_equal(r.status, index < cases[i].kinds ? QMAT_OK : QMAT_ERROR_FORMAT);
+      if (r.status == QMAT_OK)
+        assert_string_equal(r.scene->placement_paths[0],
+                            (index % 2 == 0) == cases[i].large_is_first ? "/p/large" : "/p/small");
+      release(&r);
+    }
+  }
+}
+
+/* A stronger layer moves targets to the ends of the weaker list, or leaves them where they are. */
+static void test_targets_are_edited_from_weak_to_strong(void **state) {
+  (void)state;
+  static const struct {
+    const char *edit, *order;
+  } cases[] = {{"prepend rel prototypes = [</p/c>, </p/d>]", "cdab"},
+               {"append rel prototypes = [</p/a>, </p/d>]", "bcad"},
+               {"add rel prototypes = [</p/a>, </p/d>]", "abcd"},
+               {"delete rel prototypes = [</p/b>]", "ac"},
+               {"rel prototypes = [</p/d>]", "d"}};
+  char folder[64], weak[256], scene[256], text[512];
+  make_folder(folder);
+  snprintf(weak, sizeof weak, "%s/weak.usda", folder);
+  snprintf(scene, sizeof scene, "%s/scene.usda", folder);
+  static const char below[] = "#usda 1.0\ndef PointInstancer \"p\" {\nrel prototypes = [</p/a>, </p/b>, </p/c>]\n" CUBE(
+      "a", "") CUBE("b", "double size = 3") CUBE("c", "double size = 4") CUBE("d", "double size = 5") "}\n";
+  write_file(weak, below, strlen(below));
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t index = 0; index < strlen(cases[i].order); index++) {
+      snprintf(text, sizeof text,
+               "#usda 1.0\n( subLayers = [@./weak.usda@] )\nover \"p\" {\n%s\nint[] protoIndices = [%zu]\n"
+               "point3f[] positions = [(0, 0, 0)]\n}\n",
+               cases[i].edit, index);
+      reading r = read_at(scene, text, "all");
+      assert_int_equal(r.status, QMAT_OK);
+      assert_int_equal(r.scene->placement_paths[0][3], cases[i].order[index]);
+      release(&r);
+    }
+  }
+  unlink(weak);
+  rmdir(folder);
+}
+
+/* Thousands of relative targets below a prim with a long name are refused before they fill the memory. */
+static void test_targets_with_too_many_bytes_are_refused(void **state) {
+  (void)state;
+  enum { NAME = 60000, TARGETS = 1500 };
+  char *text = malloc(NAME + 16 * TARGETS + 512);
+  assert_non_null(text);
+  int used = sprintf(text, "#usda 1.0\ndef PointInstancer \"");
+  memset(text + used, 'n', NAME);
+  used += NAME;
+  used += sprintf(text + used, "\" {\nint[] protoIndices = [0]\nrel prototypes = [");
+  for (int i = 0; i < TARGETS; i++) used += sprintf(text + used, "<a%d>, ", i);
+  sprintf(text + used, "]\n}\n");
+  reading r = read_choice(text, "all");
+  assert_int_equal(r.status, QMAT_ERROR_FORMAT);
+  assert_non_null(strstr(r.context.error.message, "the targets of a relationship have paths of more than"));
+  release(&r);
+  free(text);
+}
+
+/* An instancer with an error is left out of a scene that has more; its prototypes count one way or the other. */
+static void test_a_broken_instancer_is_left_out_of_a_scene_with_more(void **state) {
+  (void)state;
+  reading r = read_all("#usda 1.0\n" CUBE("first", "") INSTANCER(TWO "int[] protoIndices = [0, 5]\n")
+                           CUBE("last", "double size = 4"));
+  assert_int_equal(r.scene->placement_count, 2);
+  assert_place(&r, 0, 0, "/first", 0, 0, 0);
+  assert_place(&r, 1, 1, "/last", 0, 0, 0);
+  assert_string_equal(warning_of(&r, 0),
+                      "/many: left out with all its instances: instance 1 has prototype 5, but there are 2");
+  assert_string_equal(warning_of(&r, 1), "");
+  assert_int_equal(r.context.error.status, QMAT_OK);
+  release(&r);
+}
+
 /* Places of all kinds come back through a glTF file as they were: also mirrors, and what shears. */
 static void test_places_in_gltf_are_where_the_scene_has_them(void **state) {
   (void)state;
@@ -630,6 +728,10 @@ int main(void) {
       cmocka_unit_test(test_inactive_instances_and_those_of_proxies_are_left_out),
       cmocka_unit_test(test_prototypes_are_found_through_references_and_instancers_nest),
       cmocka_unit_test(test_broken_instancers_are_errors_that_name_the_prim),
+      cmocka_unit_test(test_targets_that_an_edit_repeats_count_once),
+      cmocka_unit_test(test_targets_are_edited_from_weak_to_strong),
+      cmocka_unit_test(test_targets_with_too_many_bytes_are_refused),
+      cmocka_unit_test(test_a_broken_instancer_is_left_out_of_a_scene_with_more),
       cmocka_unit_test(test_places_in_gltf_are_where_the_scene_has_them),
       cmocka_unit_test(test_a_layer_adds_medial_meshes_and_takes_nothing),
       cmocka_unit_test(test_tiles_are_kept_and_other_files_are_named),
