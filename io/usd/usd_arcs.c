@@ -29,6 +29,7 @@ qmat_status qmat_usd_new_node(qmat_usd_composer *c, node *parent, qmat_usd_arc a
                   .arcs_deep = parent ? parent->arcs_deep + 1 : 0,
                   .time = parent ? parent->time : (qmat_usd_time){.scale = 1},
                   .stack = stack,
+                  .variant = parent ? parent->variant : NULL,
                   .specs = qmat_arena_alloc(arena, most_specs, sizeof(qmat_usd_spec *)),
                   .layers = qmat_arena_alloc(arena, most_specs, sizeof(qmat_usd_layer *)),
                   .parent = parent};
@@ -101,6 +102,7 @@ qmat_status qmat_usd_copy_tree(qmat_usd_composer *c, const node *from, node *par
   if (status != QMAT_OK) return status;
   (*made)->introduced = from->introduced;
   (*made)->time = from->time;
+  (*made)->variant = from->variant;
   for (size_t i = 0; i < from->spec_count && from->introduced >= least; i++) {
     const qmat_usd_spec *spec = qmat_usd_child(from->layers[i], from->specs[i], QMAT_USD_PRIM, name);
     if (spec) qmat_usd_add_spec(*made, from->layers[i], spec);
@@ -405,6 +407,7 @@ static qmat_status add_variant(qmat_usd_composer *c, node *tree, node *at, const
     if (has_variant(tree, set, selection)) return QMAT_OK;
     return qmat_usd_warn(c->prim, "there is no variant '%s' of '%s'", qmat_usd_shown(selection), qmat_usd_shown(set));
   }
+  made->variant = made->specs[0];
   link_node(at, made);
   return qmat_usd_add_arcs(c, made);
 }

@@ -96,6 +96,12 @@ qmat_status qmat_usd_fail_prim_memory(const qmat_usd_prim *prim) {
   return qmat_fail_memory(prim->log->context, "a composed prim");
 }
 
+bool qmat_usd_path_ends_in(const char *path, const char *end) {
+  const size_t length = strlen(path), wanted = strlen(end);
+  if (wanted == 0 || wanted > length || strcmp(path + length - wanted, end) != 0) return false;
+  return wanted == length || path[length - wanted - 1] == '/';
+}
+
 void qmat_usd_prim_uninit(qmat_usd_prim *prim) {
   qmat_arena_uninit(&prim->arena);
   *prim = (qmat_usd_prim){0};
@@ -134,6 +140,21 @@ qmat_status qmat_usd_prim_children(qmat_usd_prim *prim, const char *const **name
     }
   }
   *names = made;
+  return QMAT_OK;
+}
+
+qmat_status qmat_usd_prim_find_child(qmat_usd_prim *prim, const char *name, size_t length, const char **found) {
+  *found = NULL;
+  char *copy = qmat_arena_alloc(&prim->arena, length + 1, 1);
+  if (!copy) return qmat_usd_fail_prim_memory(prim);
+  memcpy(copy, name, length);
+  copy[length] = '\0';
+  for (size_t i = 0; i < prim->opinion_count && !*found; i++) {
+    const qmat_usd_opinion *opinion = &prim->opinions[i];
+    const qmat_usd_spec *child =
+        is_of_children(prim, i) ? qmat_usd_child(opinion->layer, opinion->spec, QMAT_USD_PRIM, copy) : NULL;
+    if (child) *found = child->name;
+  }
   return QMAT_OK;
 }
 

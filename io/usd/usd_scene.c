@@ -172,6 +172,12 @@ static bool is_other_shape(const char *type) {
   return false;
 }
 
+/* Whether an earlier run has added the prim, with its skin, to a prim that has a mesh. */
+static bool is_addition(const reader *r, const qmat_usd_prim *prim) {
+  const qmat_usd_value *data = qmat_usd_prim_field(prim, "customData");
+  return qmat_usd_is_medial_data(data) && (r->leaves_medials || qmat_usd_text(qmat_usd_entry(data, "qmat_prim")));
+}
+
 /* Whether the prim and all prims below it are skipped. Updates the inherited purpose. */
 static qmat_status find_skipped(reader *r, const qmat_usd_prim *prim, inherited *state, bool *skipped) {
   const char *visibility, *purpose;
@@ -180,7 +186,7 @@ static qmat_status find_skipped(reader *r, const qmat_usd_prim *prim, inherited 
     r->scene->prims_skipped++;
     return QMAT_OK;
   }
-  if (r->leaves_medials && qmat_usd_prim_is_medial(prim)) return QMAT_OK;
+  if (is_addition(r, prim)) return QMAT_OK;
   const char *specifier = qmat_usd_prim_specifier(prim);
   qmat_status status = QMAT_OK;
   if (strcmp(specifier, "class") == 0 && !state->is_prototype) return QMAT_OK;
