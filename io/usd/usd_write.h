@@ -27,7 +27,8 @@ typedef struct qmat_usd_options {
 /* Makes a USD layer of a medial mesh: one Xform, the default prim, with
  *  - "skin", a Mesh without subdivision (if `skin` is not NULL and has triangles);
  *  - "spheres", Points with widths (diameters) and primvars:radius, and with primvars:skel:jointIndices and
- * jointWeights (4 each) where the medial mesh has a skin: numbered as by the model's mesh;
+ * jointWeights (4 each) and the schema SkelBindingAPI where the medial mesh has a skin: numbered as by the model's
+ * mesh;
  *  - "cones", BasisCurves (if there are edges): a line of two points for each edge, with widths, primvars:radius and
  * the sphere indices primvars:qmat:sphere;
  *  - "slabs", a Mesh over all spheres with primvars:radius (if there are triangles);
