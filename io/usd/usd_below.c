@@ -98,7 +98,7 @@ static const qmat_usd_spec *find_variant(const qmat_usd_prim *prim) {
   return NULL;
 }
 
-qmat_status qmat_usd_below_look(qmat_usd_below *below, const char *path, qmat_usd_beneath *beneath) {
+qmat_status qmat_usd_below_find(qmat_usd_below *below, const char *path, qmat_usd_beneath *beneath) {
   bool found;
   *beneath = (qmat_usd_beneath){0};
   qmat_status status = open_prims(below, path, &found);

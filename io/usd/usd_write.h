@@ -68,7 +68,8 @@ typedef struct qmat_usd_addition {
  *
  * A layer that is no package has one side part, the scene's file: "original.usda", ".usdc" or ".usdz". A package
  * contains everything: the layer first, and the scene's files in the folder "original". options->form and name are
- * those of the first addition. QMAT_ERROR_GEOMETRY, QMAT_ERROR_MEMORY. `*file` as above. */
+ * those of the first addition. QMAT_ERROR_GEOMETRY, QMAT_ERROR_MEMORY, QMAT_CANCELLED, and the errors of
+ * io/usd/usd_stage.h. `*file` as above. Cost: linear; the prims with a mesh and their children are composed again. */
 qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
                                  size_t count, json_t *report, qmat_file **file);
 

@@ -188,13 +188,13 @@ static int warn_of_variant(json_t *report, const char *path, const qmat_usd_spec
 }
 
 /* Finds what the scene says of the carriers. */
-static qmat_status look_below(qmat_context *context, qmat_usd_below *below, carriers *list, json_t *report) {
+static qmat_status find_beneath(qmat_context *context, qmat_usd_below *below, carriers *list, json_t *report) {
   qmat_status status = QMAT_OK;
   size_t variants = 0;
   bool failed = false;
   for (size_t i = 0; i < list->count && status == QMAT_OK; i++) {
     carrier *at = &list->items[i];
-    status = qmat_usd_below_look(below, at->path, &at->beneath);
+    status = qmat_usd_below_find(below, at->path, &at->beneath);
     if (status != QMAT_OK || !at->beneath.variant || !report) continue;
     if (variants++ < MOST_VARIANTS_NAMED)
       failed = failed || warn_of_variant(report, at->path, at->beneath.variant) != 0;
@@ -382,7 +382,7 @@ qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene,
   qmat_status status = open_original(context, part, ending, &original);
   if (status == QMAT_OK) status = qmat_usd_below_open(context, part, &below);
   if (status == QMAT_OK) status = list_carriers(context, scene, additions, &list);
-  if (status == QMAT_OK) status = look_below(context, &below, &list, report);
+  if (status == QMAT_OK) status = find_beneath(context, &below, &list, report);
   if (status == QMAT_OK) {
     if (in_package && original.member_count > 0)
       snprintf(sublayer, sizeof sublayer, "original/%s", original.members[0].name);
