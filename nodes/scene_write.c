@@ -231,7 +231,8 @@ static const char *first_path(const qmat_scene *scene, size_t mesh) {
 
 /* A layer over a USD scene that was kept. */
 static qmat_status write_layer(qmat_context *context, const scene_write_params *params,
-                               const qmat_value *const inputs[], qmat_stated_errors *stated, qmat_file **file) {
+                               const qmat_value *const inputs[], json_t *report, qmat_stated_errors *stated,
+                               qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
   if (count != scene->mesh_count) {
@@ -252,7 +253,7 @@ static qmat_status write_layer(qmat_context *context, const scene_write_params *
     if (!is_skinned(scene, i))
       additions[i].options.colliders = (const qmat_colliders *)qmat_shown_given(inputs[IN_COLLIDERS], i);
   }
-  const qmat_status status = qmat_usd_write_layer(context, scene, additions, count, file);
+  const qmat_status status = qmat_usd_write_layer(context, scene, additions, count, report, file);
   qmat_free(additions);
   return status;
 }
@@ -266,9 +267,9 @@ static qmat_status fail_several(qmat_context *context, size_t count) {
 }
 
 static qmat_status write_usd(qmat_context *context, const scene_write_params *params, const qmat_value *const inputs[],
-                             qmat_stated_errors *stated, qmat_file **file) {
+                             json_t *report, qmat_stated_errors *stated, qmat_file **file) {
   const qmat_scene *scene = (const qmat_scene *)inputs[IN_SCENE];
-  if (keeps_scene(params, scene)) return write_layer(context, params, inputs, stated, file);
+  if (keeps_scene(params, scene)) return write_layer(context, params, inputs, report, stated, file);
   const size_t count = qmat_value_count(inputs[IN_MEDIAL]);
   if (count > 1) return fail_several(context, count);
   qmat_usd_options options = usd_options_of(params, scene, (const qmat_medial *)inputs[IN_MEDIAL],
@@ -496,7 +497,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
       case FORMAT_USDA:
       case FORMAT_USDC:
       case FORMAT_USDZ:
-        status = write_usd(context, params, inputs, stated, &file);
+        status = write_usd(context, params, inputs, report->root, stated, &file);
         break;
       default:
         status = write_gltf(context, params, inputs, report->root, stated, &file);

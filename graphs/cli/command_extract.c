@@ -44,7 +44,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 
 static const qmat_option options[] = {
     {"output", 'o', "PATH", "Save the medial mesh; the ending chooses the format: .ma or .ply"},
-    {"node", 0, "NAME", "The node or prim whose medial mesh to extract, if several have one"},
+    {"node", 0, "NAME", "The node or prim whose medial mesh to extract, if several have one; a prim also by its path"},
     {"quiet", 'q', NULL, "Print nothing but errors"},
     {0},
 };

@@ -204,8 +204,15 @@ static qmat_status print_medial(const info_call *call, const char *path, const c
       const bool by_mesh = mesh && (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF);
       char number[24] = "merged";
       if (by_mesh) snprintf(number, sizeof number, "%lld", (long long)json_integer_value(mesh));
-      const char *prim = json_string_value(json_object_get(facts, "qmat_prim"));
+      const char *prim = json_string_value(json_object_get(facts, "qmat_prim")),
+                 *composed = json_string_value(json_object_get(facts, "composed_prim"));
+      const qmat_error before = context->error;
       status = check_against(call, against, format == QMAT_FORMAT_USD && prim ? prim : number, medial, facts, json);
+      if (status == QMAT_ERROR_USAGE && format == QMAT_FORMAT_USD && composed) {
+        /* The stage refers to the one that the medial mesh was made for, under another path. */
+        context->error = before;
+        status = check_against(call, against, composed, medial, facts, json);
+      }
     }
     qmat_value_release(&medial->base);
   }
@@ -329,7 +336,7 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
 static const qmat_option options[] = {
     {"against", 0, "MODEL",
      "Measure the errors of the medial mesh against this model, and compare them with the stated ones"},
-    {"node", 0, "NAME", "The node or prim whose medial mesh to use, if several have one"},
+    {"node", 0, "NAME", "The node or prim whose medial mesh to use, if several have one; a prim also by its path"},
     {"json", 0, NULL, "Print a list with an object of each file as JSON"},
     {0},
 };

@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "io/usd/usd_list.h"
+
 /* A scene may be composed of this many nodes, and more for each spec of its layers. */
 #define FREE_NODES ((size_t)1 << 22)
 #define NODES_PER_SPEC 64
@@ -27,6 +29,7 @@ qmat_status qmat_usd_new_node(qmat_usd_composer *c, node *parent, qmat_usd_arc a
                   .arcs_deep = parent ? parent->arcs_deep + 1 : 0,
                   .time = parent ? parent->time : (qmat_usd_time){.scale = 1},
                   .stack = stack,
+                  .variant = parent ? parent->variant : NULL,
                   .specs = qmat_arena_alloc(arena, most_specs, sizeof(qmat_usd_spec *)),
                   .layers = qmat_arena_alloc(arena, most_specs, sizeof(qmat_usd_layer *)),
                   .parent = parent};
@@ -86,6 +89,11 @@ const qmat_usd_spec *qmat_usd_spec_at(const qmat_usd_layer *layer, const char *p
   return spec;
 }
 
+/* A prim may have thousands of arcs, each of which is compared with the others: they count as steps, too. */
+static qmat_status report_work(const qmat_usd_composer *c) {
+  return qmat_progress(c->prim->log->context, *c->nodes_made + 1, 0, "opinions");
+}
+
 /* ---- trees of children ---- */
 
 qmat_status qmat_usd_copy_tree(qmat_usd_composer *c, const node *from, node *parent, const char *name, int least,
@@ -94,6 +102,7 @@ qmat_status qmat_usd_copy_tree(qmat_usd_composer *c, const node *from, node *par
   if (status != QMAT_OK) return status;
   (*made)->introduced = from->introduced;
   (*made)->time = from->time;
+  (*made)->variant = from->variant;
   for (size_t i = 0; i < from->spec_count && from->introduced >= least; i++) {
     const qmat_usd_spec *spec = qmat_usd_child(from->layers[i], from->specs[i], QMAT_USD_PRIM, name);
     if (spec) qmat_usd_add_spec(*made, from->layers[i], spec);
@@ -130,69 +139,24 @@ qmat_status qmat_usd_add_arcs_of_copies(qmat_usd_composer *c, node *at) {
 
 /* ---- edits of lists ---- */
 
-/* An item of a list: a text or a qmat_usd_reference of a value, and the layer that has it. */
-typedef struct list_item {
-  const void *value;
-  const qmat_usd_layer *layer;
-} list_item;
-
-/* A list to which edits are applied. */
-typedef struct edited_list {
-  size_t count, capacity;
-  list_item *items;
-} edited_list;
-
-static bool are_in_one_folder(const char *a, const char *b) {
-  const char *name_of_a = strrchr(a, '/'), *name_of_b = strrchr(b, '/');
-  if (!name_of_a || !name_of_b) return !name_of_a && !name_of_b;
-  return name_of_a - a == name_of_b - b && strncmp(a, b, (size_t)(name_of_a - a)) == 0;
-}
-
-/* Whether two items are the same text or refer to the same prim. An asset is relative to the folder of its layer. */
-static bool same_item(qmat_usd_type type, list_item a, list_item b) {
-  if (type != QMAT_USD_REFERENCE) return strcmp(a.value, b.value) == 0;
-  const qmat_usd_reference *x = a.value, *y = b.value;
-  return strcmp(x->asset, y->asset) == 0 && strcmp(x->path, y->path) == 0 &&
-         (!x->asset[0] || are_in_one_folder(a.layer->path, b.layer->path));
-}
-
-static list_item item_at(const qmat_usd_value *list, size_t i, const qmat_usd_layer *layer) {
-  const void *value = list->type == QMAT_USD_REFERENCE ? (const void *)&list->references[i] : list->texts[i];
-  return (list_item){.value = value, .layer = layer};
-}
-
-static void remove_item(edited_list *list, qmat_usd_type type, list_item item) {
-  size_t kept = 0;
-  for (size_t i = 0; i < list->count; i++) {
-    if (!same_item(type, list->items[i], item)) list->items[kept++] = list->items[i];
+/* Applies one edit of a layer. False when memory is short. */
+static bool apply_edit(qmat_usd_list *list, qmat_usd_edit edit, const qmat_usd_value *value,
+                       const qmat_usd_layer *layer) {
+  qmat_usd_item *items = qmat_alloc(value->count, sizeof *items);
+  for (size_t i = 0; items && i < value->count; i++) {
+    const void *item = value->type == QMAT_USD_REFERENCE ? (const void *)&value->references[i] : value->texts[i];
+    items[i] = (qmat_usd_item){.value = item, .layer = layer};
   }
-  list->count = kept;
+  const bool good = items && qmat_usd_list_edit(list, edit, items, value->count);
+  qmat_free(items);
+  return good;
 }
 
-/* Inserts the items of a layer at the front or the end of a list. Items that it already has move, or stay with
- * `only_new`. */
-static bool insert_items(edited_list *list, const qmat_usd_value *items, const qmat_usd_layer *layer, bool at_front,
-                         bool only_new) {
-  if (qmat_grow((void **)&list->items, &list->capacity, list->count + items->count, sizeof *list->items) != 0)
-    return false;
-  for (size_t i = 0; i < items->count && !only_new; i++) remove_item(list, items->type, item_at(items, i, layer));
-  size_t at = at_front ? 0 : list->count;
-  memmove(list->items + at + items->count, list->items + at, (list->count - at) * sizeof *list->items);
-  for (size_t i = 0; i < items->count; i++) {
-    const list_item item = item_at(items, i, layer);
-    bool known = false;
-    for (size_t k = 0; k < at && only_new; k++) known = known || same_item(items->type, list->items[k], item);
-    if (known) continue;
-    list->items[at++] = item;
-    list->count++;
-  }
-  return true;
-}
-
-/* Applies the edits of a field in the node's specs, weakest first. The caller frees list->items. */
+/* Applies the edits of a field in the node's specs, weakest first. The caller frees the list. */
 static qmat_status edit_list(const qmat_usd_composer *c, const node *at, const char *field, qmat_usd_type wanted,
-                             edited_list *list) {
-  *list = (edited_list){0};
+                             qmat_usd_list *list) {
+  static const qmat_usd_edit order[] = {QMAT_USD_DELETED, QMAT_USD_ADDED, QMAT_USD_PREPENDED, QMAT_USD_APPENDED};
+  *list = (qmat_usd_list){.has_references = wanted == QMAT_USD_REFERENCE};
   for (size_t i = at->spec_count; i-- > 0;) {
     const qmat_usd_layer *layer = at->layers[i];
     const qmat_usd_value *value = qmat_usd_field_value(at->specs[i], field);
@@ -209,16 +173,11 @@ static qmat_status edit_list(const qmat_usd_composer *c, const node *at, const c
     if (!good) return qmat_usd_prim_fail(c->prim, "%s has a value of the wrong type", field);
     if (total + list->count > MOST_ARCS_OF_PRIM)
       return qmat_usd_prim_fail(c->prim, "%s has more than %d items", field, MOST_ARCS_OF_PRIM);
-    if (op->is_explicit) {
-      list->count = 0;
-      good = insert_items(list, &op->lists[QMAT_USD_EXPLICIT], layer, false, false);
-    } else {
-      for (size_t k = 0; k < op->lists[QMAT_USD_DELETED].count; k++)
-        remove_item(list, wanted, item_at(&op->lists[QMAT_USD_DELETED], k, layer));
-      good = insert_items(list, &op->lists[QMAT_USD_ADDED], layer, false, true) &&
-             insert_items(list, &op->lists[QMAT_USD_PREPENDED], layer, true, false) &&
-             insert_items(list, &op->lists[QMAT_USD_APPENDED], layer, false, false);
-    }
+    const qmat_status status = report_work(c);
+    if (status != QMAT_OK) return status;
+    if (op->is_explicit) good = apply_edit(list, QMAT_USD_EXPLICIT, &op->lists[QMAT_USD_EXPLICIT], layer);
+    for (size_t k = 0; k < sizeof order / sizeof *order && good && !op->is_explicit; k++)
+      if (op->lists[order[k]].count > 0) good = apply_edit(list, order[k], &op->lists[order[k]], layer);
     if (!good) return qmat_usd_fail_prim_memory(c->prim);
   }
   return QMAT_OK;
@@ -327,7 +286,8 @@ static qmat_status add_target(qmat_usd_composer *c, node *at, qmat_usd_arc arc, 
   return qmat_usd_add_arcs_of_copies(c, made);
 }
 
-static qmat_status add_reference(qmat_usd_composer *c, node *at, qmat_usd_arc arc, list_item item, const char *what) {
+static qmat_status add_reference(qmat_usd_composer *c, node *at, qmat_usd_arc arc, qmat_usd_item item,
+                                 const char *what) {
   const qmat_usd_reference *reference = item.value;
   size_t stack = at->stack;
   if (reference->asset[0]) {
@@ -353,10 +313,10 @@ static qmat_status add_reference(qmat_usd_composer *c, node *at, qmat_usd_arc ar
 
 static qmat_status add_references(qmat_usd_composer *c, node *at, qmat_usd_arc arc, const char *field,
                                   const char *what) {
-  edited_list list;
+  qmat_usd_list list;
   qmat_status status = edit_list(c, at, field, QMAT_USD_REFERENCE, &list);
   for (size_t i = 0; i < list.count && status == QMAT_OK; i++) status = add_reference(c, at, arc, list.items[i], what);
-  qmat_free(list.items);
+  qmat_usd_list_uninit(&list);
   return status;
 }
 
@@ -376,13 +336,13 @@ static qmat_status warn_of_class(const qmat_usd_composer *c, const node *at, con
 }
 
 static qmat_status add_classes(qmat_usd_composer *c, node *at, qmat_usd_arc arc, const char *field, const char *what) {
-  edited_list list;
+  qmat_usd_list list;
   qmat_status status = edit_list(c, at, field, QMAT_USD_PATH, &list);
   for (size_t i = 0; i < list.count && status == QMAT_OK; i++) {
     status = add_target(c, at, arc, at->stack, list.items[i].value, NULL, what);
     if (status == QMAT_OK) status = warn_of_class(c, at, list.items[i].value);
   }
-  qmat_free(list.items);
+  qmat_usd_list_uninit(&list);
   return status;
 }
 
@@ -431,10 +391,12 @@ static qmat_status add_variant(qmat_usd_composer *c, node *tree, node *at, const
   for (size_t i = 0; i < at->spec_count; i++)
     is_there = is_there || qmat_usd_child(at->layers[i], at->specs[i], QMAT_USD_VARIANT_SET, set);
   if (!is_there) return QMAT_OK;
+  qmat_status status = report_work(c);
+  if (status != QMAT_OK) return status;
   const char *selection = find_selection(tree, set);
   if (!selection) return qmat_usd_warn(c->prim, "no variant of '%s' is selected: all are skipped", qmat_usd_shown(set));
   node *made;
-  qmat_status status = qmat_usd_new_node(c, at, QMAT_USD_ARC_VARIANT, at->stack, at->spec_count, &made);
+  status = qmat_usd_new_node(c, at, QMAT_USD_ARC_VARIANT, at->stack, at->spec_count, &made);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < at->spec_count; i++) {
     const qmat_usd_spec *variants = qmat_usd_child(at->layers[i], at->specs[i], QMAT_USD_VARIANT_SET, set);
@@ -445,6 +407,7 @@ static qmat_status add_variant(qmat_usd_composer *c, node *tree, node *at, const
     if (has_variant(tree, set, selection)) return QMAT_OK;
     return qmat_usd_warn(c->prim, "there is no variant '%s' of '%s'", qmat_usd_shown(selection), qmat_usd_shown(set));
   }
+  made->variant = made->specs[0];
   link_node(at, made);
   return qmat_usd_add_arcs(c, made);
 }
@@ -464,10 +427,10 @@ static qmat_status add_variants(qmat_usd_composer *c, node *tree) {
   node *at;
   while ((at = find_undone(tree)) != NULL) {
     at->has_variants_done = true;
-    edited_list sets;
+    qmat_usd_list sets;
     qmat_status status = edit_list(c, at, "variantSetNames", QMAT_USD_STRING, &sets);
     for (size_t i = 0; i < sets.count && status == QMAT_OK; i++) status = add_variant(c, tree, at, sets.items[i].value);
-    qmat_free(sets.items);
+    qmat_usd_list_uninit(&sets);
     if (status != QMAT_OK) return status;
   }
   return QMAT_OK;

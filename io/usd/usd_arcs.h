@@ -27,6 +27,7 @@ typedef struct qmat_usd_node {
   size_t spec_count; /* of layers of the stack that have a spec, strongest first */
   const qmat_usd_spec **specs;
   const qmat_usd_layer **layers;
+  const qmat_usd_spec *variant; /* the nearest variant from this node to the root; NULL: none */
   bool has_variants_done;
   struct qmat_usd_node *parent, *first_child, *next; /* children strongest first */
 } qmat_usd_node;

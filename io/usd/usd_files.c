@@ -201,6 +201,9 @@ static qmat_status find_asset(qmat_usd_files *files, const qmat_usd_prim *prim, 
                               const char *asset, const char *what, file **found) {
   const file *beside = (const file *)from;
   *found = NULL;
+  if (asset[0] == '`')
+    return qmat_usd_warn(prim, "the %s @%s@ is skipped: variable expressions are not read", what,
+                         qmat_usd_shown(asset));
   if (is_elsewhere(asset)) {
     return qmat_usd_warn(prim, "the %s @%s@ is skipped: only files beside the layer are read", what,
                          qmat_usd_shown(asset));

@@ -99,22 +99,39 @@ static qmat_usd_transform place(const arrays *a, size_t i) {
   return result;
 }
 
+/* The prototype of an instance; UINT32_MAX: the instance is left out. */
+static uint32_t prototype_of(const arrays *a, const id_list *masked, size_t i) {
+  const int64_t id = a->ids ? a->ids->integers[i] : (int64_t)i;
+  const bool is_masked = masked->count > 0 && bsearch(&id, masked->ids, masked->count, sizeof id, compare_ids);
+  return is_masked ? UINT32_MAX : (uint32_t)a->indices->integers[i];
+}
+
+/* Sorts the instances by their prototypes, those of one in the order of the file. */
 static qmat_status read_instances(const qmat_usd_prim *prim, qmat_arena *arena, const id_list *masked,
                                   qmat_usd_instancer *instancer) {
+  const size_t prototypes = instancer->prototype_count;
   arrays a;
   qmat_status status = read_arrays(prim, &a);
-  if (status != QMAT_OK || !a.indices) return status;
-  instancer->of = qmat_arena_alloc(arena, a.indices->count, sizeof *instancer->of);
+  if (status != QMAT_OK || !a.indices) {
+    instancer->prototype_count = 0;
+    return status;
+  }
+  instancer->ends = qmat_arena_calloc(arena, prototypes + 1, sizeof *instancer->ends);
   instancer->placements = qmat_arena_alloc(arena, a.indices->count, sizeof *instancer->placements);
-  if (!instancer->of || !instancer->placements) return qmat_usd_fail_prim_memory(prim);
+  if (!instancer->ends || !instancer->placements) return qmat_usd_fail_prim_memory(prim);
   for (size_t i = 0; i < a.indices->count; i++) {
-    const int64_t of = a.indices->integers[i], id = a.ids ? a.ids->integers[i] : (int64_t)i;
-    if (of < 0 || (uint64_t)of >= instancer->prototype_count)
+    const int64_t of = a.indices->integers[i];
+    if (of < 0 || (uint64_t)of >= prototypes)
       return qmat_usd_prim_fail(prim, "instance %zu has prototype %lld, but there are %zu", i, (long long)of,
-                                instancer->prototype_count);
-    if (masked->count > 0 && bsearch(&id, masked->ids, masked->count, sizeof id, compare_ids)) continue;
-    instancer->of[instancer->instance_count] = (uint32_t)of;
-    instancer->placements[instancer->instance_count++] = place(&a, i);
+                                prototypes);
+    const uint32_t prototype = prototype_of(&a, masked, i);
+    if (prototype != UINT32_MAX) instancer->ends[prototype + 1]++;
+  }
+  for (size_t k = 1; k <= prototypes; k++) instancer->ends[k] += instancer->ends[k - 1];
+  instancer->instance_count = instancer->ends[prototypes];
+  for (size_t i = 0; i < a.indices->count; i++) {
+    const uint32_t prototype = prototype_of(&a, masked, i);
+    if (prototype != UINT32_MAX) instancer->placements[instancer->ends[prototype]++] = place(&a, i);
   }
   return QMAT_OK;
 }

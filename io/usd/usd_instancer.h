@@ -9,7 +9,7 @@ typedef struct qmat_usd_instancer {
   size_t prototype_count;
   const char *const *prototypes; /* prototype_count: paths in the scene */
   size_t instance_count;
-  uint32_t *of;                   /* instance_count: the prototype of an instance */
+  size_t *ends; /* prototype_count: where the instances of a prototype end; those of the next begin there */
   qmat_usd_transform *placements; /* instance_count: from its prototype's space into the instancer's */
 } qmat_usd_instancer;
 

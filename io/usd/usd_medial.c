@@ -1,34 +1,39 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/usd/usd_medial.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "core/geometry/medial_build.h"
+#include "core/json_text.h"
 #include "io/usd/usd_stage.h"
+
+/* A medial mesh of the scene. Prims of one name that state the same are one. */
+typedef struct found_medial {
+  const char *label;  /* the prim's name, or its path where another one has that name */
+  const char *path;   /* of the first such prim */
+  const char *parent; /* of the first one that is below a prim, or the first whose path was asked for; NULL: none is */
+  bool is_near;       /* a prim's path ends in what was asked for */
+} found_medial;
 
 typedef struct reader {
   qmat_context *context;
   qmat_usd_stage *stage;
+  const char *name; /* of the prim to read, or NULL */
+  json_t *numbers;  /* per label, and per name with what the prims state: the number in `found` */
+  size_t count, capacity;
+  found_medial *found; /* in the order of the scene */
+  qmat_arena arena;    /* of paths */
   json_t *facts;
-  const char *name;    /* of the prim to read, or NULL */
-  bool lists;          /* only lists the names */
-  json_t *names;       /* of prims with a medial mesh, as keys: prims of one name have the same one */
-  json_t *found;       /* the names in their order */
-  qmat_medial *medial; /* NULL until it is found */
+  qmat_medial *medial; /* NULL until it is read */
 } reader;
 
 /* Composes the child of this name, if the prim has one. */
 static qmat_status find_child(reader *r, qmat_usd_prim *prim, const char *name, qmat_usd_prim *child, bool *found) {
-  const char *const *names;
-  size_t count;
-  *found = false;
-  qmat_status status = qmat_usd_prim_children(prim, &names, &count);
-  for (size_t i = 0; i < count && status == QMAT_OK && !*found; i++) {
-    if (strcmp(names[i], name) != 0) continue;
-    *found = true;
-    status = qmat_usd_prim_child(r->stage, prim, names[i], child);
-  }
-  return status;
+  const char *own;
+  const qmat_status status = qmat_usd_prim_find_child(prim, name, strlen(name), &own);
+  *found = own != NULL;
+  return status == QMAT_OK && own ? qmat_usd_prim_child(r->stage, prim, own, child) : status;
 }
 
 /* `data` are the carrier's customData, which say where its space begins in the space of the model. */
@@ -100,8 +105,9 @@ static qmat_status read_simplices(reader *r, qmat_usd_prim *prim) {
   return status;
 }
 
-static qmat_status read_facts(reader *r, const qmat_usd_value *data) {
-  for (size_t i = 0; i < data->count && r->facts; i++) {
+/* Adds the entries of customData to an object. */
+static qmat_status read_facts(const reader *r, const qmat_usd_value *data, json_t *facts) {
+  for (size_t i = 0; i < data->count && facts; i++) {
     const qmat_usd_value *value = data->entries[i].value;
     const char *text = qmat_usd_text(value);
     const bool is_single = !value->is_array && value->components == 1;
@@ -111,7 +117,7 @@ static qmat_status read_facts(reader *r, const qmat_usd_value *data) {
                    : qmat_usd_is_integer(value->type) && is_single ? json_integer(value->integers[0])
                    : qmat_usd_is_number(value->type) && is_single  ? json_real(value->numbers[0])
                                                                    : NULL;
-    if (json && json_object_set_new(r->facts, data->entries[i].name, json) != 0)
+    if (json && json_object_set_new(facts, data->entries[i].name, json) != 0)
       return qmat_fail_memory(r->context, "the facts about a medial mesh");
   }
   return QMAT_OK;
@@ -130,18 +136,58 @@ static qmat_status read_carrier(reader *r, qmat_usd_prim *prim, const qmat_usd_v
   qmat_usd_prim_uninit(&spheres);
   if (status == QMAT_OK) status = read_simplices(r, prim);
   if (status == QMAT_OK) status = qmat_value_seal(r->context, &r->medial->base);
-  return status == QMAT_OK ? read_facts(r, data) : status;
+  return status == QMAT_OK ? read_facts(r, data, r->facts) : status;
+}
+
+/* ---- the medial meshes of a scene ---- */
+
+static qmat_status fail_shortage(const reader *r) {
+  return qmat_fail_memory(r->context, "a medial mesh");
+}
+
+/* The number of the medial mesh that a prim has, which is added if it is new. */
+static qmat_status number_medial(reader *r, const qmat_usd_prim *prim, const char *path, size_t *number) {
+  const char *own = qmat_usd_shown(prim->name);
+  json_t *stated = json_object();
+  qmat_status status = stated ? read_facts(r, qmat_usd_prim_field(prim, "customData"), stated) : fail_shortage(r);
+  char *text = status == QMAT_OK ? qmat_json_text(stated, JSON_COMPACT | JSON_SORT_KEYS, NULL) : NULL;
+  json_t *key = text ? json_sprintf("%s\n%s", own, text) : NULL; /* no label has a line break */
+  qmat_free(text);
+  json_decref(stated);
+  const json_t *known = key ? json_object_get(r->numbers, json_string_value(key)) : NULL;
+  *number = known ? (size_t)json_integer_value(known) : r->count;
+  if (status == QMAT_OK && !key) status = fail_shortage(r);
+  if (status == QMAT_OK && !known) {
+    const char *label = json_object_get(r->numbers, own) ? qmat_usd_shown(path) : own;
+    if (qmat_grow((void **)&r->found, &r->capacity, r->count + 1, sizeof *r->found) != 0 ||
+        json_object_set_new(r->numbers, label, json_integer((json_int_t)r->count)) != 0 ||
+        json_object_set_new(r->numbers, json_string_value(key), json_integer((json_int_t)r->count)) != 0)
+      status = fail_shortage(r);
+    else
+      r->found[r->count++] = (found_medial){.label = label, .path = path};
+  }
+  json_decref(key);
+  return status;
+}
+
+/* Adds a prim with a medial mesh. Its parent is the prim that the medial mesh stands for. */
+static qmat_status add_prim(reader *r, const qmat_usd_prim *prim) {
+  const char *path = qmat_usd_prim_path(prim, &r->arena), *parent = qmat_usd_prim_path(prim->parent, &r->arena);
+  size_t number;
+  if (!path || !parent) return fail_shortage(r);
+  const qmat_status status = number_medial(r, prim, path, &number);
+  if (status != QMAT_OK) return status;
+  found_medial *found = &r->found[number];
+  const bool is_below = prim->parent->parent != NULL;
+  const bool is_near = r->name && (qmat_usd_path_ends_in(parent, r->name) ||
+                                   (strchr(r->name, '/') && qmat_usd_path_ends_in(path, r->name)));
+  if (is_below && (!found->parent || (is_near && !found->is_near))) found->parent = parent;
+  found->is_near = found->is_near || is_near;
+  return QMAT_OK;
 }
 
 static qmat_status search(reader *r, qmat_usd_prim *prim) {
-  if (prim->parent && qmat_usd_prim_is_medial(prim)) {
-    const char *own = qmat_usd_shown(prim->name);
-    if (!json_object_get(r->names, own) && (json_object_set_new(r->names, own, json_true()) != 0 ||
-                                            json_array_append_new(r->found, json_string(own)) != 0))
-      return qmat_fail_memory(r->context, "a medial mesh");
-    if (r->lists || r->medial || (r->name && strcmp(r->name, prim->name) != 0)) return QMAT_OK;
-    return read_carrier(r, prim, qmat_usd_prim_field(prim, "customData"));
-  }
+  if (prim->parent && qmat_usd_prim_is_medial(prim)) return add_prim(r, prim);
   const char *const *names;
   size_t count;
   qmat_status status = qmat_usd_prim_children(prim, &names, &count);
@@ -155,42 +201,115 @@ static qmat_status search(reader *r, qmat_usd_prim *prim) {
   return status;
 }
 
-/* Searches all prims. The caller releases r->found. */
+/* Opens the scene and finds its medial meshes. Close the reader also after a failure. */
 static qmat_status search_all(reader *r, const qmat_bytes *bytes, const char *path) {
   qmat_usd_prim root = {0};
-  r->names = json_object();
-  r->found = json_array();
-  qmat_status status = r->names && r->found ? qmat_usd_stage_open(r->context, bytes, path, &r->stage)
-                                            : qmat_fail_memory(r->context, "a medial mesh");
+  r->numbers = json_object();
+  qmat_status status = r->numbers ? qmat_usd_stage_open(r->context, bytes, path, &r->stage) : fail_shortage(r);
   if (status == QMAT_OK) status = qmat_usd_stage_root(r->stage, &root);
   if (status == QMAT_OK) status = search(r, &root);
   qmat_usd_prim_uninit(&root);
-  qmat_usd_stage_close(r->stage);
-  json_decref(r->names);
   return status;
 }
 
+static void reader_close(reader *r) {
+  qmat_usd_stage_close(r->stage);
+  json_decref(r->numbers);
+  qmat_free(r->found);
+  qmat_arena_uninit(&r->arena);
+}
+
 qmat_status qmat_usd_list_medials(qmat_context *context, const qmat_bytes *bytes, const char *path, json_t **names) {
-  reader r = {.context = context, .lists = true};
-  const qmat_status status = search_all(&r, bytes, path);
-  if (status != QMAT_OK) json_decref(r.found);
-  *names = status == QMAT_OK ? r.found : NULL;
+  reader r = {.context = context};
+  qmat_status status = search_all(&r, bytes, path);
+  *names = status == QMAT_OK ? json_array() : NULL;
+  if (status == QMAT_OK && !*names) status = fail_shortage(&r);
+  for (size_t i = 0; i < r.count && status == QMAT_OK; i++)
+    if (json_array_append_new(*names, json_string(r.found[i].label)) != 0) status = fail_shortage(&r);
+  if (status != QMAT_OK) {
+    json_decref(*names);
+    *names = NULL;
+  }
+  reader_close(&r);
   return status;
+}
+
+/* ---- the choice ---- */
+
+/* A hint with the first medial meshes to choose from. */
+static void hint_choices(const reader *r) {
+  enum { MOST_SHOWN = 3 };
+  char text[200] = "";
+  size_t used = 0, shown = 0;
+  for (size_t i = 0; i < r->count && shown < MOST_SHOWN; i++) {
+    const found_medial *found = &r->found[i];
+    const char *parent = found->parent ? qmat_usd_shown(found->parent) : NULL;
+    char one[sizeof text];
+    const int length = snprintf(one, sizeof one, "%s%s%s%s", shown > 0 ? ", " : "", found->label, parent ? " of " : "",
+                                parent ? parent : "");
+    if (length < 0 || (size_t)length >= sizeof text - used) break;
+    memcpy(text + used, one, (size_t)length + 1);
+    used += (size_t)length;
+    shown++;
+  }
+  qmat_fail_hint(r->context, "--node with a name or the path of a prim: %s%s", text,
+                 shown < r->count ? ", ...; qmat info lists all" : "");
+}
+
+/* The number of the medial mesh to read: the one with this label, or with a prim whose path ends so. */
+static qmat_status choose(const reader *r, size_t *choice) {
+  size_t near = 0;
+  *choice = 0;
+  if (r->count == 0) return qmat_fail(r->context, QMAT_ERROR_GEOMETRY, "no prim has a medial mesh");
+  if (!r->name && r->count == 1) return QMAT_OK;
+  for (size_t i = 0; i < r->count && r->name; i++) {
+    if (strcmp(r->found[i].label, r->name) == 0) {
+      *choice = i;
+      return QMAT_OK;
+    }
+    if (r->found[i].is_near && near++ == 0) *choice = i;
+  }
+  if (near == 1) return QMAT_OK;
+  if (r->name && near == 0)
+    qmat_fail(r->context, QMAT_ERROR_GEOMETRY, "no prim of this name has a medial mesh");
+  else
+    qmat_fail(r->context, QMAT_ERROR_USAGE, "%zu prims have a medial mesh: name one of them",
+              r->name ? near : r->count);
+  hint_choices(r);
+  return r->context->error.status;
+}
+
+static qmat_status read_visited(void *user, qmat_usd_prim *prim) {
+  return read_carrier(user, prim, qmat_usd_prim_field(prim, "customData"));
+}
+
+static qmat_status visit_nothing(void *user, qmat_usd_prim *prim) {
+  (void)user, (void)prim;
+  return QMAT_OK;
+}
+
+/* States the prim that the medial mesh stands for, where the stage does not have the path that the file states: that is
+ * one of another stage, which this one refers to. */
+static qmat_status state_parent(reader *r, const char *parent) {
+  const char *stated = json_string_value(json_object_get(r->facts, "qmat_prim"));
+  bool found;
+  if (!stated || !parent || !qmat_is_utf8(parent)) return QMAT_OK;
+  const qmat_status status = qmat_usd_stage_visit(r->stage, stated, visit_nothing, NULL, &found);
+  if (status != QMAT_OK || found) return status;
+  return json_object_set_new(r->facts, "composed_prim", json_string(parent)) == 0 ? QMAT_OK : fail_shortage(r);
 }
 
 qmat_status qmat_usd_read_medial(qmat_context *context, const qmat_bytes *bytes, const char *path, const char *name,
                                  qmat_medial **medial, json_t *facts) {
   reader r = {.context = context, .facts = facts, .name = name};
+  size_t choice;
+  bool found;
   *medial = NULL;
   qmat_status status = search_all(&r, bytes, path);
-  const size_t carriers = json_array_size(r.found);
-  json_decref(r.found);
-  if (status == QMAT_OK && !r.medial) {
-    qmat_fail(context, status = QMAT_ERROR_GEOMETRY,
-              carriers > 0 ? "no prim of this name has a medial mesh" : "no prim has a medial mesh");
-  } else if (status == QMAT_OK && !name && carriers > 1) {
-    qmat_fail(context, status = QMAT_ERROR_USAGE, "%zu prims have a medial mesh: name one of them", carriers);
-  }
+  if (status == QMAT_OK) status = choose(&r, &choice);
+  if (status == QMAT_OK) status = qmat_usd_stage_visit(r.stage, r.found[choice].path, read_visited, &r, &found);
+  if (status == QMAT_OK && facts) status = state_parent(&r, r.found[choice].parent);
+  reader_close(&r);
   if (status == QMAT_OK) {
     *medial = r.medial;
     return QMAT_OK;

@@ -14,13 +14,6 @@ static qmat_status fail_shortage(qmat_context *context) {
 
 /* ---- the choice ---- */
 
-/* Whether `path` is `choice`, or ends in it after a slash. */
-static bool ends_in(const char *path, const char *choice) {
-  const size_t length = strlen(path), wanted = strlen(choice);
-  if (wanted == 0 || wanted > length || strcmp(path + length - wanted, choice) != 0) return false;
-  return wanted == length || path[length - wanted - 1] == '/';
-}
-
 /* The number that `choice` is; SIZE_MAX: it is none. */
 static size_t number_of(const char *choice) {
   const size_t length = strlen(choice);
@@ -37,7 +30,7 @@ static qmat_status choose(qmat_context *context, const qmat_usd_scene *scene, co
   for (size_t i = 0; i < scene->mesh_count; i++) chosen[i] = all;
   for (size_t i = 0; i < scene->placement_count && !all; i++) {
     const qmat_usd_placement *placement = &scene->placements[i];
-    if (chosen[placement->mesh] || !ends_in(placement->path, choice)) continue;
+    if (chosen[placement->mesh] || !qmat_usd_path_ends_in(placement->path, choice)) continue;
     chosen[placement->mesh] = true;
     if (found++ == 0) first = placement->path;
   }

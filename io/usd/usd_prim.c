@@ -81,8 +81,25 @@ qmat_status qmat_usd_prim_fail(const qmat_usd_prim *prim, const char *format, ..
   return qmat_fail_at(context, prim->log->file, 0, 0);
 }
 
+qmat_status qmat_usd_warn_of_error(const qmat_usd_prim *prim, const char *what, const qmat_error *before) {
+  qmat_context *context = prim->log->context;
+  char message[sizeof context->error.message], path[PATH_TEXT];
+  const char *shown = path_of(prim, path), *text = message;
+  memcpy(message, context->error.message, sizeof message);
+  if (strncmp(text, shown, strlen(shown)) == 0 && strncmp(text + strlen(shown), ": ", 2) == 0)
+    text += strlen(shown) + 2;
+  context->error = *before;
+  return qmat_usd_warn(prim, "%s: %s", what, text);
+}
+
 qmat_status qmat_usd_fail_prim_memory(const qmat_usd_prim *prim) {
   return qmat_fail_memory(prim->log->context, "a composed prim");
+}
+
+bool qmat_usd_path_ends_in(const char *path, const char *end) {
+  const size_t length = strlen(path), wanted = strlen(end);
+  if (wanted == 0 || wanted > length || strcmp(path + length - wanted, end) != 0) return false;
+  return wanted == length || path[length - wanted - 1] == '/';
 }
 
 void qmat_usd_prim_uninit(qmat_usd_prim *prim) {
@@ -123,6 +140,21 @@ qmat_status qmat_usd_prim_children(qmat_usd_prim *prim, const char *const **name
     }
   }
   *names = made;
+  return QMAT_OK;
+}
+
+qmat_status qmat_usd_prim_find_child(qmat_usd_prim *prim, const char *name, size_t length, const char **found) {
+  *found = NULL;
+  char *copy = qmat_arena_alloc(&prim->arena, length + 1, 1);
+  if (!copy) return qmat_usd_fail_prim_memory(prim);
+  memcpy(copy, name, length);
+  copy[length] = '\0';
+  for (size_t i = 0; i < prim->opinion_count && !*found; i++) {
+    const qmat_usd_opinion *opinion = &prim->opinions[i];
+    const qmat_usd_spec *child =
+        is_of_children(prim, i) ? qmat_usd_child(opinion->layer, opinion->spec, QMAT_USD_PRIM, copy) : NULL;
+    if (child) *found = child->name;
+  }
   return QMAT_OK;
 }
 

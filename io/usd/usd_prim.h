@@ -25,6 +25,7 @@ typedef struct qmat_usd_opinion {
   bool is_inherited; /* through an inherit or specialize arc */
   int introduced;    /* the depth of the prim with the arc that brings the spec's paths into the scene; 0: none does */
   int arc_depth;     /* the same, but variants count as arcs too */
+  const qmat_usd_spec *variant; /* the nearest one that brings the spec; NULL: none does */
   qmat_usd_time time;
 } qmat_usd_opinion;
 
@@ -56,6 +57,10 @@ qmat_status qmat_usd_warn(const qmat_usd_prim *prim, const char *format, ...) __
 qmat_status qmat_usd_prim_fail(const qmat_usd_prim *prim, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
+/* Turns the error that qmat_usd_prim_fail has recorded about the prim into a warning, "what: the error's text", and
+ * puts the error `before` back. QMAT_ERROR_MEMORY. */
+qmat_status qmat_usd_warn_of_error(const qmat_usd_prim *prim, const char *what, const qmat_error *before);
+
 /* QMAT_ERROR_MEMORY about composing a prim. */
 qmat_status qmat_usd_fail_prim_memory(const qmat_usd_prim *prim);
 
@@ -69,6 +74,10 @@ bool qmat_usd_prim_is_medial(const qmat_usd_prim *prim);
 
 /* The names of the children in their order, in the prim's memory. QMAT_ERROR_MEMORY. */
 qmat_status qmat_usd_prim_children(qmat_usd_prim *prim, const char *const **names, size_t *count);
+
+/* The child whose name is the first `length` bytes of `name`: its name in the memory of a layer, or NULL. Cost: a
+ * look-up for each opinion. QMAT_ERROR_MEMORY. */
+qmat_status qmat_usd_prim_find_child(qmat_usd_prim *prim, const char *name, size_t length, const char **found);
 
 /* The strongest value of a field of the prim itself ("typeName", "active"), or NULL. */
 const qmat_usd_value *qmat_usd_prim_field(const qmat_usd_prim *prim, const char *name);
@@ -108,6 +117,9 @@ qmat_status qmat_usd_prim_targets(const qmat_usd_prim *prim, const char *name, q
 
 /* The path of a prim in the scene, in the arena's memory; NULL when memory is short. */
 const char *qmat_usd_prim_path(const qmat_usd_prim *prim, qmat_arena *arena);
+
+/* Whether a path is `end`, or ends in it after a slash. */
+bool qmat_usd_path_ends_in(const char *path, const char *end);
 
 void qmat_usd_prim_uninit(qmat_usd_prim *prim);
 

@@ -31,6 +31,7 @@ typedef struct reader {
   size_t segments;
   bool takes_undefined; /* also reads prims that only have an 'over' */
   bool has_undefined;   /* such a prim was found */
+  qmat_error broken;    /* of the first instancer that is left out; QMAT_OK: there is none */
   bool leaves_medials;  /* the root layer is one that qmat has written over another */
   qmat_key_table known; /* the numbers of meshes by the first bytes of their digests */
 } reader;
@@ -171,6 +172,12 @@ static bool is_other_shape(const char *type) {
   return false;
 }
 
+/* Whether an earlier run has added the prim, with its skin, to a prim that has a mesh. */
+static bool is_addition(const reader *r, const qmat_usd_prim *prim) {
+  const qmat_usd_value *data = qmat_usd_prim_field(prim, "customData");
+  return qmat_usd_is_medial_data(data) && (r->leaves_medials || qmat_usd_text(qmat_usd_entry(data, "qmat_prim")));
+}
+
 /* Whether the prim and all prims below it are skipped. Updates the inherited purpose. */
 static qmat_status find_skipped(reader *r, const qmat_usd_prim *prim, inherited *state, bool *skipped) {
   const char *visibility, *purpose;
@@ -179,7 +186,7 @@ static qmat_status find_skipped(reader *r, const qmat_usd_prim *prim, inherited 
     r->scene->prims_skipped++;
     return QMAT_OK;
   }
-  if (r->leaves_medials && qmat_usd_prim_is_medial(prim)) return QMAT_OK;
+  if (is_addition(r, prim)) return QMAT_OK;
   const char *specifier = qmat_usd_prim_specifier(prim);
   qmat_status status = QMAT_OK;
   if (strcmp(specifier, "class") == 0 && !state->is_prototype) return QMAT_OK;
@@ -249,6 +256,7 @@ static qmat_status read_prototype(void *user, qmat_usd_prim *prim) {
 /* Places what a prototype has, the places from `first` on, at each of its instances instead. */
 static qmat_status place_instances(const reader *r, const qmat_usd_prim *prim, const qmat_usd_instancer *instancer,
                                    size_t prototype, const inherited *state, size_t first) {
+  const size_t begin = prototype > 0 ? instancer->ends[prototype - 1] : 0, end = instancer->ends[prototype];
   qmat_usd_scene *scene = r->scene;
   const size_t count = scene->placement_count - first;
   qmat_usd_placement *own = qmat_alloc(count, sizeof *own);
@@ -256,9 +264,9 @@ static qmat_status place_instances(const reader *r, const qmat_usd_prim *prim, c
   if (count > 0) memcpy(own, scene->placements + first, count * sizeof *own);
   scene->placement_count = first;
   qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < instancer->instance_count && status == QMAT_OK; i++) {
+  for (size_t i = begin; i < end && status == QMAT_OK; i++) {
     if (i % 65536 == 0) status = qmat_progress(r->context, i, instancer->instance_count, "instances");
-    if (instancer->of[i] != prototype || status != QMAT_OK) continue;
+    if (status != QMAT_OK) break;
     const qmat_usd_transform world = qmat_usd_product(&instancer->placements[i], &state->world);
     for (size_t k = 0; k < count && status == QMAT_OK; k++) {
       qmat_usd_placement placed = own[k];
@@ -274,7 +282,12 @@ static qmat_status read_instancer(reader *r, qmat_usd_prim *prim, const inherite
   qmat_usd_instancer instancer;
   if (state->instancers >= DEEPEST_INSTANCERS)
     return qmat_usd_prim_fail(prim, "instancers are nested more than %d deep", DEEPEST_INSTANCERS);
+  const qmat_error before = r->context->error;
   qmat_status status = qmat_usd_instancer_read(prim, &prim->arena, &instancer);
+  if (status == QMAT_ERROR_FORMAT) {
+    if (r->broken.status == QMAT_OK) r->broken = r->context->error;
+    return qmat_usd_warn_of_error(prim, "left out with all its instances", &before);
+  }
   if (status != QMAT_OK) return status;
   r->scene->point_instances += instancer.instance_count;
   /* Prototypes do not inherit the instancer's place twice. */
@@ -287,6 +300,7 @@ static qmat_status read_instancer(reader *r, qmat_usd_prim *prim, const inherite
   for (size_t i = 0; i < instancer.prototype_count && status == QMAT_OK; i++) {
     const size_t first = r->scene->placement_count;
     bool found;
+    if (instancer.ends[i] == (i > 0 ? instancer.ends[i - 1] : 0)) continue; /* it has no instance */
     status = qmat_usd_stage_visit(r->stage, instancer.prototypes[i], read_prototype, &p, &found);
     if (status == QMAT_OK && !found) status = qmat_usd_warn(prim, "a prototype is skipped: there is no such prim");
     if (status == QMAT_OK) status = place_instances(r, prim, &instancer, i, state, first);
@@ -330,10 +344,34 @@ static void drop_unplaced(qmat_usd_scene *scene, uint32_t *numbers) {
   scene->mesh_count = kept;
 }
 
-static qmat_status check_any(qmat_context *context, const qmat_usd_scene *scene, const char *path) {
+/* The length of a unit in meters, as the root layer states it; the default of USD where it states none that is one. */
+static double find_unit(const qmat_usd_spec *root) {
+  const double usual = 0.01, unit = qmat_usd_number(qmat_usd_field_value(root, "metersPerUnit"), usual);
+  return unit > 0 && isfinite(unit) ? unit : usual;
+}
+
+/* Warns of a unit and of an axis that are none. */
+static qmat_status check_frame(const qmat_usd_prim *root, const qmat_usd_spec *layer) {
+  const qmat_usd_value *unit = qmat_usd_field_value(layer, "metersPerUnit"),
+                       *up = qmat_usd_field_value(layer, "upAxis");
+  const char *axis = qmat_usd_text(up);
+  qmat_status status = QMAT_OK;
+  if (unit && qmat_usd_number(unit, NAN) != find_unit(layer))
+    status = qmat_usd_warn(root, "metersPerUnit is no length: %g is used", find_unit(layer));
+  if (status == QMAT_OK && up && !(axis && (strcmp(axis, "Y") == 0 || strcmp(axis, "Z") == 0)))
+    status = qmat_usd_warn(root, "upAxis is '%.40s', not Y or Z: Y is used", qmat_usd_shown(axis ? axis : "?"));
+  return status;
+}
+
+static qmat_status check_any(const reader *r, const char *path) {
+  const qmat_usd_scene *scene = r->scene;
   if (scene->placement_count > 0) return QMAT_OK;
+  if (r->broken.status != QMAT_OK) {
+    r->context->error = r->broken;
+    return r->broken.status;
+  }
   const char *first = json_string_value(json_array_get(qmat_usd_stage_warnings(scene->stage), 0));
-  return qmat_fail_file(context, QMAT_ERROR_GEOMETRY, path, "the scene has no mesh that can be read%s%s",
+  return qmat_fail_file(r->context, QMAT_ERROR_GEOMETRY, path, "the scene has no mesh that can be read%s%s",
                         first ? "; " : "", first ? first : "");
 }
 
@@ -364,10 +402,12 @@ qmat_status qmat_usd_scene_open(qmat_context *context, const qmat_bytes *bytes, 
     scene->stage = stage;
     qmat_usd_stage_forget_warnings(stage);
     r.takes_undefined = true;
+    r.broken.status = QMAT_OK;
     status = read_all(&r, &root);
   }
+  if (status == QMAT_OK) status = check_frame(&root, qmat_usd_stage_root_layer(scene->stage)->root);
   qmat_usd_prim_uninit(&root);
-  if (status == QMAT_OK) status = check_any(context, scene, path);
+  if (status == QMAT_OK) status = check_any(&r, path);
   uint32_t *numbers = status == QMAT_OK ? qmat_alloc(scene->mesh_count, sizeof *numbers) : NULL;
   if (status == QMAT_OK && !numbers) status = qmat_fail_memory(context, "a USD scene");
   if (status == QMAT_OK) drop_unplaced(scene, numbers);
@@ -407,11 +447,10 @@ qmat_status qmat_usd_scene_report(qmat_context *context, const qmat_usd_scene *s
     if (json_object_set_new(report, rows[i].key, json_integer((json_int_t)rows[i].count)) != 0)
       return qmat_fail_memory(context, "a report");
   }
-  /* The defaults are those of USD. */
-  const double unit = qmat_usd_number(qmat_usd_field_value(root, "metersPerUnit"), 0.01);
+  /* The default axis is that of USD. */
   const char *up = qmat_usd_text(qmat_usd_field_value(root, "upAxis"));
   const bool is_z = up && strcmp(up, "Z") == 0;
-  if (json_object_set_new(report, "meters_per_unit", json_real(isfinite(unit) ? unit : 0.01)) != 0 ||
+  if (json_object_set_new(report, "meters_per_unit", json_real(find_unit(root))) != 0 ||
       json_object_set_new(report, "up_axis", json_string(is_z ? "Z" : "Y")) != 0 ||
       json_object_set(report, "warnings", qmat_usd_stage_warnings(scene->stage)) != 0) {
     return qmat_fail_memory(context, "a report");

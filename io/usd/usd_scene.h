@@ -42,7 +42,8 @@ typedef struct qmat_usd_scene {
  * QMAT_ERROR_FORMAT with file, line and column for what is not USD, and with the prim for a broken mesh: negative face
  * counts, face counts whose sum differs from the number of indices, indices out of range, values of the wrong type.
  * QMAT_ERROR_GEOMETRY when there is no mesh, more places than the files justify (2^20, and one for each 8 bytes), or
- * different shapes of more than 2^24 vertices and corners.
+ * different shapes of more than 2^24 vertices and corners. A broken PointInstancer is left out with a warning; it is an
+ * error where nothing else can be read.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. Close the scene also after a failure. One thread. Cost: linear in the files and
  * the places. */
 qmat_status qmat_usd_scene_open(qmat_context *context, const qmat_bytes *bytes, const char *path, size_t segments,

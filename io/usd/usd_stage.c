@@ -89,6 +89,7 @@ static void list_opinions(const qmat_usd_files *files, const node *at, bool inhe
         .is_inherited = inherited,
         .introduced = introduced,
         .arc_depth = at->introduced,
+        .variant = at->variant,
         .time = qmat_usd_time_through(at->time, qmat_usd_stack_time(&files->stacks[at->stack], at->layers[i]))};
   for (const node *child = at->first_child; child; child = child->next)
     list_opinions(files, child, inherited, specialized, wanted, introduced, opinions, count);
@@ -143,14 +144,11 @@ static qmat_status visit_below(qmat_usd_stage *stage, qmat_usd_prim *above, cons
     return visit(user, above);
   }
   const size_t length = strcspn(++path, "/");
-  const char *const *names;
-  size_t count, at = 0;
-  qmat_status status = qmat_usd_prim_children(above, &names, &count);
-  if (status != QMAT_OK) return status;
-  while (at < count && (strlen(names[at]) != length || memcmp(names[at], path, length) != 0)) at++;
-  if (at == count) return QMAT_OK;
+  const char *name;
+  qmat_status status = qmat_usd_prim_find_child(above, path, length, &name);
+  if (status != QMAT_OK || !name) return status;
   qmat_usd_prim child;
-  status = qmat_usd_prim_child(stage, above, names[at], &child);
+  status = qmat_usd_prim_child(stage, above, name, &child);
   if (status == QMAT_OK) status = visit_below(stage, &child, path + length, visit, user, found);
   qmat_usd_prim_uninit(&child);
   return status;

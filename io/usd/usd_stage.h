@@ -37,7 +37,7 @@ void qmat_usd_stage_forget_warnings(qmat_usd_stage *stage);
 qmat_status qmat_usd_stage_root(qmat_usd_stage *stage, qmat_usd_prim *prim);
 
 /* Composes one child, which keeps a pointer to its parent. QMAT_ERROR_FORMAT also when the scene becomes larger than
- * its files justify, as nested references can make it. */
+ * its files justify, as nested references can make it. QMAT_CANCELLED. */
 qmat_status qmat_usd_prim_child(qmat_usd_stage *stage, const qmat_usd_prim *parent, const char *name,
                                 qmat_usd_prim *child);
 

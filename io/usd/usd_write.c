@@ -224,7 +224,9 @@ static void put_joints(qmat_writer *writer, const qmat_medial *medial) {
 }
 
 static void put_spheres(qmat_writer *writer, const qmat_medial *medial) {
-  qmat_put_text(writer, "\n    def Points \"spheres\"\n    {\n");
+  qmat_put_text(writer, "\n    def Points \"spheres\"");
+  if (medial->skinned_count > 0) qmat_put_text(writer, " (\n        prepend apiSchemas = [\"SkelBindingAPI\"]\n    )");
+  qmat_put_text(writer, "\n    {\n");
   put_extent(writer, medial->spheres, medial->sphere_count, 4, true);
   put_points(writer, medial->spheres, medial->sphere_count, 4);
   put_radii(writer, "primvars:radius", medial, NULL, medial->sphere_count, 1);

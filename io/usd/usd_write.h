@@ -2,6 +2,8 @@
 #ifndef QMAT_IO_USD_USD_WRITE_H
 #define QMAT_IO_USD_USD_WRITE_H
 
+#include <jansson.h>
+
 #include "io/bytes.h"
 #include "io/stored_medial.h"
 
@@ -25,7 +27,8 @@ typedef struct qmat_usd_options {
 /* Makes a USD layer of a medial mesh: one Xform, the default prim, with
  *  - "skin", a Mesh without subdivision (if `skin` is not NULL and has triangles);
  *  - "spheres", Points with widths (diameters) and primvars:radius, and with primvars:skel:jointIndices and
- * jointWeights (4 each) where the medial mesh has a skin: numbered as by the model's mesh;
+ * jointWeights (4 each) and the schema SkelBindingAPI where the medial mesh has a skin: numbered as by the model's
+ * mesh;
  *  - "cones", BasisCurves (if there are edges): a line of two points for each edge, with widths, primvars:radius and
  * the sphere indices primvars:qmat:sphere;
  *  - "slabs", a Mesh over all spheres with primvars:radius (if there are triangles);
@@ -54,18 +57,20 @@ typedef struct qmat_usd_addition {
 /* Makes a layer over a USD scene that was kept (io/usd/usd_keep.h): its sublayer is the scene's own file, and prims
  * with an "over" add a child to each prim that has a mesh. Prims whose names text cannot have get none. The child
  * references the class of the mesh's medial mesh, which is described once, in the mesh's space: "medial_0" for mesh 0;
- * other names where the scene has such prims. A medial mesh that a prim has already becomes inactive.
- * `additions` has one element per mesh of the scene. With instances in the scene, the prims on the way are no longer
- * instanceable, which would hide the additions. Layer metadata that only a root layer may have are copied: the default
- * prim, units, axis and times.
+ * other names where the scene, or a layer that it refers to, has such prims. A medial mesh that a prim has already
+ * becomes inactive. `report` (a JSON object, may be NULL) gains a warning for each of the first prims whose shape is
+ * that of a variant: the medial mesh stays when another one is selected. `additions` has one element per mesh of the
+ * scene. With instances in the scene, the prims on the way are no longer instanceable, which would hide the additions.
+ * Layer metadata that only a root layer may have are copied: the default prim, units, axis and times.
  *
  * With colliders, the prims become rigid bodies, each with the mass and the inertia of its place, in the units of mass
  * and length of the scene; not where a prim, or one above it, is a body already or is a collider (placement_bodies).
  *
  * A layer that is no package has one side part, the scene's file: "original.usda", ".usdc" or ".usdz". A package
  * contains everything: the layer first, and the scene's files in the folder "original". options->form and name are
- * those of the first addition. QMAT_ERROR_GEOMETRY, QMAT_ERROR_MEMORY. `*file` as above. */
+ * those of the first addition. QMAT_ERROR_GEOMETRY, QMAT_ERROR_MEMORY, QMAT_CANCELLED, and the errors of
+ * io/usd/usd_stage.h. `*file` as above. Cost: linear; the prims with a mesh and their children are composed again. */
 qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
-                                 size_t count, qmat_file **file);
+                                 size_t count, json_t *report, qmat_file **file);
 
 #endif

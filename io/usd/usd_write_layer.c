@@ -6,13 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/json_text.h"
 #include "core/node.h"
 #include "io/collider_frames.h"
-#include "io/usd/usd_arcs.h"
+#include "io/usd/usd_below.h"
 #include "io/usd/usd_colliders.h"
 #include "io/usd/usd_write.h"
-#include "io/usd/usda.h"
-#include "io/usd/usdc.h"
 #include "io/usd/usdc_write.h"
 #include "io/usd/usdz.h"
 
@@ -21,6 +20,7 @@ typedef struct carrier {
   const char *path;
   uint32_t mesh;
   size_t place; /* number in the scene's placements */
+  qmat_usd_beneath beneath;
 } carrier;
 
 static qmat_status fail_shortage(qmat_context *context) {
@@ -115,25 +115,13 @@ static bool has_valid_names(const char *path) {
 }
 
 /* What the names of the prims begin with that are added, before the number of the mesh. */
-enum { LONGEST_STEM = 31 };
-
-/* Whether a prim of the original's root layer has a name that begins like those that are added. */
-static bool is_taken(const qmat_usd_spec *root, const char *stem) {
-  const size_t length = strlen(stem);
-  for (const qmat_usd_spec *spec = root; spec;) {
-    if (spec->kind == QMAT_USD_PRIM && strncmp(spec->name, stem, length) == 0) return true;
-    const qmat_usd_spec *next = spec->first_child;
-    for (; !next && spec != root; spec = spec->parent) next = spec->next;
-    if (spec == root && !next) return false;
-    spec = next;
-  }
-  return false;
-}
+enum { LONGEST_STEM = 31, MOST_VARIANTS_NAMED = 3 };
 
 /* Chooses the stem, so that no prim of the original gets opinions that are meant for another. */
-static void choose_stem(const qmat_usd_spec *root, char stem[LONGEST_STEM + 1]) {
+static void choose_stem(const qmat_usd_below *below, char stem[LONGEST_STEM + 1]) {
   snprintf(stem, LONGEST_STEM + 1, "medial_");
-  for (unsigned i = 2; is_taken(root, stem) && i < 1000; i++) snprintf(stem, LONGEST_STEM + 1, "medial%u_", i);
+  for (unsigned i = 2; qmat_usd_below_has_stem(below, stem) && i < 1000; i++)
+    snprintf(stem, LONGEST_STEM + 1, "medial%u_", i);
 }
 
 /* Writes a prim that has only metadata. */
@@ -155,13 +143,12 @@ static void put_empty_prim(qmat_writer *writer, size_t depth, const char *kind, 
   qmat_put_text(writer, "}\n");
 }
 
-/* Hides the medial meshes that a prim (NULL: none) has already, as in a scene that was flattened after an earlier run.
- */
-static void hide_earlier(qmat_writer *writer, size_t depth, const qmat_usd_spec *prim) {
-  for (const qmat_usd_spec *child = prim ? prim->first_child : NULL; child; child = child->next)
-    if (child->kind == QMAT_USD_PRIM && is_valid_name(child->name) &&
-        qmat_usd_is_medial_data(qmat_usd_field_value(child, "customData")))
-      put_empty_prim(writer, depth, "over", child->name, "active = false");
+/* Hides the medial meshes that a prim has already: of a scene that was flattened after an earlier run, or that refers
+ * to a layer of one. */
+static void hide_earlier(qmat_writer *writer, size_t depth, const qmat_usd_beneath *beneath) {
+  for (size_t i = 0; i < beneath->medial_count; i++)
+    if (is_valid_name(beneath->medials[i]))
+      put_empty_prim(writer, depth, "over", beneath->medials[i], "active = false");
 }
 
 static void put_reference(qmat_writer *writer, size_t depth, const char *stem, uint32_t mesh) {
@@ -171,45 +158,83 @@ static void put_reference(qmat_writer *writer, size_t depth, const char *stem, u
   put_empty_prim(writer, depth, "def Xform", name, reference);
 }
 
-/* Writes the prims that carry a mesh with a medial mesh. */
-static qmat_status put_overs(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
-                             const qmat_usd_layer *original, const char *stem, qmat_writer *writer) {
-  carrier *carriers = qmat_alloc(scene->placement_count, sizeof *carriers);
-  if (!carriers) return fail_shortage(context);
-  const double kilograms = qmat_usd_number(qmat_usd_field_value(original->root, "kilogramsPerUnit"), 1);
-  size_t count = 0, open = 0;
-  size_t body = SIZE_MAX; /* the depth of the open prim that is a body: one below is a part of it */
+/* The prims that carry a mesh with a medial mesh, each once, in the order in which they are written. */
+typedef struct carriers {
+  size_t count;
+  carrier *items;
+} carriers;
+
+static qmat_status list_carriers(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
+                                 carriers *list) {
+  list->items = qmat_alloc(scene->placement_count, sizeof *list->items);
+  if (!list->items) return fail_shortage(context);
+  size_t count = 0;
   for (size_t i = 0; i < scene->placement_count; i++)
     if (additions[scene->placed[i]].medial && has_valid_names(scene->placement_paths[i]))
-      carriers[count++] = (carrier){.path = scene->placement_paths[i], .mesh = scene->placed[i], .place = i};
-  qsort(carriers, count, sizeof *carriers, compare_carriers);
-  for (size_t i = 0; i < count; i++) {
-    const char *path = carriers[i].path, *before = i > 0 ? carriers[i - 1].path : "";
-    if (i > 0 && strcmp(path, before) == 0) continue; /* a prototype of several instances */
-    const size_t shared = i > 0 ? common_names(path, before) : 0;
+      list->items[count++] = (carrier){.path = scene->placement_paths[i], .mesh = scene->placed[i], .place = i};
+  if (count > 0) qsort(list->items, count, sizeof *list->items, compare_carriers);
+  for (size_t i = 0; i < count; i++) /* a prototype has several instances */
+    if (i == 0 || strcmp(list->items[i].path, list->items[list->count - 1].path) != 0)
+      list->items[list->count++] = list->items[i];
+  return QMAT_OK;
+}
+
+/* The path is UTF-8, since text can have its names. */
+static int warn_of_variant(json_t *report, const char *path, const qmat_usd_spec *variant) {
+  return qmat_json_add_warning(report,
+                               "%s: its shape is that of the variant '%s' of '%s', but the medial mesh stays when "
+                               "another variant is selected: run qmat again for each",
+                               path, qmat_usd_shown(variant->name), qmat_usd_shown(variant->parent->name));
+}
+
+/* Finds what the scene says of the carriers. */
+static qmat_status find_beneath(qmat_context *context, qmat_usd_below *below, carriers *list, json_t *report) {
+  qmat_status status = QMAT_OK;
+  size_t variants = 0;
+  bool failed = false;
+  for (size_t i = 0; i < list->count && status == QMAT_OK; i++) {
+    carrier *at = &list->items[i];
+    status = qmat_usd_below_find(below, at->path, &at->beneath);
+    if (status != QMAT_OK || !at->beneath.variant || !report) continue;
+    if (variants++ < MOST_VARIANTS_NAMED)
+      failed = failed || warn_of_variant(report, at->path, at->beneath.variant) != 0;
+  }
+  if (status == QMAT_OK && variants > MOST_VARIANTS_NAMED)
+    failed = failed || qmat_json_add_warning(report, "and %zu more prims have the shape of a variant",
+                                             variants - MOST_VARIANTS_NAMED) != 0;
+  return failed ? fail_shortage(context) : status;
+}
+
+/* Writes the prims that carry a mesh with a medial mesh. */
+static void put_overs(const qmat_scene *scene, const qmat_usd_addition *additions, const carriers *list,
+                      const qmat_usd_layer *original, const char *stem, qmat_writer *writer) {
+  const double kilograms = qmat_usd_number(qmat_usd_field_value(original->root, "kilogramsPerUnit"), 1);
+  size_t open = 0;
+  size_t body = SIZE_MAX; /* the depth of the open prim that is a body: one below is a part of it */
+  for (size_t i = 0; i < list->count; i++) {
+    const carrier *at = &list->items[i];
+    const size_t shared = i > 0 ? common_names(at->path, list->items[i - 1].path) : 0;
     while (open > shared) {
       qmat_put_indent(writer, --open);
       qmat_put_text(writer, "}\n");
     }
     if (body >= open) body = SIZE_MAX;
-    const qmat_usd_options *options = &additions[carriers[i].mesh].options;
+    const qmat_usd_options *options = &additions[at->mesh].options;
     const bool is_body =
-        options->colliders && options->dynamic && body == SIZE_MAX && !scene->placement_bodies[carriers[i].place];
-    open_prims(writer, path, open, scene->has_instances, is_body);
-    open = count_names(path);
+        options->colliders && options->dynamic && body == SIZE_MAX && !scene->placement_bodies[at->place];
+    open_prims(writer, at->path, open, scene->has_instances, is_body);
+    open = count_names(at->path);
     if (is_body) {
       body = open - 1;
-      put_body(writer, open, scene, carriers[i].place, options, kilograms > 0 ? kilograms : 1);
+      put_body(writer, open, scene, at->place, options, kilograms > 0 ? kilograms : 1);
     }
-    hide_earlier(writer, open, qmat_usd_spec_at(original, path));
-    put_reference(writer, open, stem, scene->meshes[carriers[i].mesh]);
+    hide_earlier(writer, open, &at->beneath);
+    put_reference(writer, open, stem, scene->meshes[at->mesh]);
   }
   while (open > 0) {
     qmat_put_indent(writer, --open);
     qmat_put_text(writer, "}\n");
   }
-  qmat_free(carriers);
-  return QMAT_OK;
 }
 
 /* ---- the layer's metadata ---- */
@@ -264,14 +289,16 @@ static const char *ending_of(const qmat_file_part *part) {
 }
 
 static qmat_status put_text(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
-                            size_t count, const qmat_usd_layer *original, const char *sublayer, qmat_writer *text) {
+                            size_t count, const qmat_usd_below *below, const carriers *list, const char *sublayer,
+                            qmat_writer *text) {
+  const qmat_usd_layer *original = qmat_usd_stage_root_layer(below->stage);
   qmat_status status = QMAT_OK;
   char stem[LONGEST_STEM + 1];
   const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
   if (plain == (locale_t)0) return fail_shortage(context);
   const locale_t before = uselocale(plain);
   put_metadata(text, original->root, scene->is_z_up, sublayer);
-  choose_stem(original->root, stem);
+  choose_stem(below, stem);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     char prim[LONGEST_STEM + 16];
     if (!additions[i].medial) continue;
@@ -279,7 +306,7 @@ static qmat_status put_text(qmat_context *context, const qmat_scene *scene, cons
     status = qmat_usd_put_class(context, additions[i].medial, additions[i].skin, &additions[i].options, prim, text);
     qmat_put_text(text, "\n");
   }
-  if (status == QMAT_OK) status = put_overs(context, scene, additions, original, stem, text);
+  if (status == QMAT_OK) put_overs(scene, additions, list, original, stem, text);
   uselocale(before);
   freelocale(plain);
   return status;
@@ -291,16 +318,6 @@ static qmat_status open_original(qmat_context *context, const qmat_file_part *pa
   const qmat_bytes bytes = {.data = part->bytes, .size = part->size};
   *package = (qmat_usdz){0};
   return strcmp(ending, "usdz") == 0 ? qmat_usdz_open(context, &bytes, "the scene", package) : QMAT_OK;
-}
-
-/* Reads the root layer of what was kept. `package` has the members where it is one. */
-static qmat_status read_root_layer(qmat_context *context, const qmat_file_part *part, const qmat_usdz *package,
-                                   qmat_usd_layer *layer) {
-  const qmat_usdz_member *first = package->member_count > 0 ? &package->members[0] : NULL;
-  const qmat_bytes bytes = {.data = first ? (uint8_t *)(uintptr_t)first->bytes : part->bytes,
-                            .size = first ? first->size : part->size};
-  return qmat_usdc_is_crate(&bytes) ? qmat_usdc_read(context, &bytes, "the scene", layer)
-                                    : qmat_usda_read(context, &bytes, "the scene", layer);
 }
 
 static qmat_status make_package(qmat_context *context, const qmat_usdz *original, const qmat_file_part *part,
@@ -351,24 +368,27 @@ static qmat_status make_pair(qmat_context *context, const qmat_file_part *part, 
 }
 
 qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
-                                 size_t count, qmat_file **file) {
+                                 size_t count, json_t *report, qmat_file **file) {
   const qmat_file_part *part = &scene->parts[0];
   const char *ending = ending_of(part);
   const qmat_usd_form form = additions[0].options.form;
   const bool in_package = form == QMAT_USD_PACKAGE;
   char sublayer[512];
-  qmat_usd_layer layer = {0};
+  qmat_usd_below below = {0};
+  carriers list = {0};
   qmat_usdz original = {0};
   qmat_writer text = {0};
   *file = NULL;
   qmat_status status = open_original(context, part, ending, &original);
-  if (status == QMAT_OK) status = read_root_layer(context, part, &original, &layer);
+  if (status == QMAT_OK) status = qmat_usd_below_open(context, part, &below);
+  if (status == QMAT_OK) status = list_carriers(context, scene, additions, &list);
+  if (status == QMAT_OK) status = find_beneath(context, &below, &list, report);
   if (status == QMAT_OK) {
     if (in_package && original.member_count > 0)
       snprintf(sublayer, sizeof sublayer, "original/%s", original.members[0].name);
     else
       snprintf(sublayer, sizeof sublayer, in_package ? "original/scene.%s" : "original.%s", ending);
-    status = put_text(context, scene, additions, count, &layer, sublayer, &text);
+    status = put_text(context, scene, additions, count, &below, &list, sublayer, &text);
   }
   if (status == QMAT_OK && text.failed) status = fail_shortage(context);
   if (status == QMAT_OK && form == QMAT_USD_CRATE) status = qmat_usdc_of_text(context, &text);
@@ -377,6 +397,7 @@ qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene,
                         : make_pair(context, part, sublayer, form == QMAT_USD_CRATE ? "usdc" : "usda", &text, file);
   qmat_writer_uninit(&text);
   qmat_usdz_uninit(&original);
-  qmat_usd_layer_uninit(&layer);
+  qmat_free(list.items);
+  qmat_usd_below_close(&below);
   return status;
 }

@@ -313,7 +313,7 @@ static void write_usd_layer(const qmat_scene *scene) {
   require(additions);
   for (size_t i = 0; i < scene->mesh_count; i++)
     additions[i] = (qmat_usd_addition){.medial = medial, .options = {.moved = 1e-3, .prim = "/p"}};
-  require(qmat_usd_write_layer(&context, scene, additions, scene->mesh_count, &file) == QMAT_OK);
+  require(qmat_usd_write_layer(&context, scene, additions, scene->mesh_count, NULL, &file) == QMAT_OK);
   qmat_usd_layer layer = {0};
   qmat_bytes text = memory_file(file->parts[0].bytes, file->parts[0].size);
   require(read_layer(&context, &text, "layer", &layer) == QMAT_OK);

@@ -382,6 +382,8 @@ static void test_joints_of_usd_meshes_reach_their_spheres_and_the_layer(void **s
   char *text = calloc(file->parts[0].size + 1, 1);
   assert_non_null(text);
   memcpy(text, file->parts[0].bytes, file->parts[0].size);
+  assert_non_null(
+      strstr(text, "def Points \"spheres\" (\n        prepend apiSchemas = [\"SkelBindingAPI\"]\n    )\n    {\n"));
   const char *at = strstr(text, "int[] primvars:skel:jointIndices = [");
   assert_non_null(at);
   at = strchr(at, '[') + 2;

@@ -136,7 +136,13 @@ expect 0 "spheres describe" "$qmat" mat scene.usda -o over.usda --colliders --ep
 holds "the prim is a body, its class is not" test "$(grep -c PhysicsRigidBodyAPI over.usda)" -eq 1
 expect 0 "a medial mesh of" "$qmat" info over.usda --node medial_0
 expect 1 "no prim of this name" "$qmat" info over.usda --node nosuch
-rm layer.usda kept.usda scene.usda over*
+# A stage that refers to what an earlier run made: its prims have other paths, and its medial meshes are replaced.
+printf '#usda 1.0\ndef "shop"\n{\n    def "crate" (references = @over.usda@</Cube>)\n    {\n    }\n}\n' >shop.usda
+expect 0 "composed_prim: /shop/crate" "$qmat" info shop.usda --against shop.usda
+expect 0 "spheres" "$qmat" extract shop.usda --node shop/crate -o again.ma
+expect 0 "describe" "$qmat" mat shop.usda -o again.usda --vertices 1 $coarse
+expect 0 "a medial mesh of 1 spheres" "$qmat" info again.usda --against shop.usda
+rm layer.usda kept.usda scene.usda over* shop.usda again*
 
 # The report and the depfile: not in one file, and both in a folder that is made.
 expect 2 "would overwrite the report" "$qmat" mat box.off -o over.ma --epsilon 5% $coarse \

@@ -270,6 +270,104 @@ static void test_broken_instancers_are_errors_that_name_the_prim(void **state) {
   release(&r);
 }
 
+/* Of a target that an edit repeats, the first counts where it prepends, and the last where it appends. */
+static void test_targets_that_an_edit_repeats_count_once(void **state) {
+  (void)state;
+  static const struct {
+    const char *edit;
+    bool large_is_first;
+    size_t kinds;
+  } cases[] = {
+      {"prepend rel prototypes = [</p/large>, </p/large>]", true, 1},
+      {"prepend rel prototypes = [</p/large>, </p/small>, </p/large>]", true, 2},
+      {"append rel prototypes = [</p/large>, </p/small>, </p/large>]", false, 2},
+      {"add rel prototypes = [</p/large>, </p/small>, </p/large>]", true, 2},
+      {"rel prototypes = [</p/large>, </p/small>, </p/large>]", true, 3}, /* in the order of protoIndices */
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    char text[1024];
+    for (size_t index = 0; index <= cases[i].kinds; index++) {
+      snprintf(text, sizeof text,
+               "#usda 1.0\ndef PointInstancer \"p\" {\n%s\nint[] protoIndices = [%zu]\n"
+               "point3f[] positions = [(0, 0, 0)]\n" CUBE("small", "") CUBE("large", "double size = 4") "}\n",
+               cases[i].edit, index);
+      reading r = read_choice(text, "all");
+      assert_int_equal(r.status, index < cases[i].kinds ? QMAT_OK : QMAT_ERROR_FORMAT);
+      if (r.status == QMAT_OK)
+        assert_string_equal(r.scene->placement_paths[0],
+                            (index % 2 == 0) == cases[i].large_is_first ? "/p/large" : "/p/small");
+      release(&r);
+    }
+  }
+}
+
+/* A stronger layer moves targets to the ends of the weaker list, or leaves them where they are. */
+static void test_targets_are_edited_from_weak_to_strong(void **state) {
+  (void)state;
+  static const struct {
+    const char *edit, *order;
+  } cases[] = {{"prepend rel prototypes = [</p/c>, </p/d>]", "cdab"},
+               {"append rel prototypes = [</p/a>, </p/d>]", "bcad"},
+               {"add rel prototypes = [</p/a>, </p/d>]", "abcd"},
+               {"delete rel prototypes = [</p/b>]", "ac"},
+               {"rel prototypes = [</p/d>]", "d"}};
+  char folder[64], weak[256], scene[256], text[512];
+  make_folder(folder);
+  snprintf(weak, sizeof weak, "%s/weak.usda", folder);
+  snprintf(scene, sizeof scene, "%s/scene.usda", folder);
+  static const char below[] = "#usda 1.0\ndef PointInstancer \"p\" {\nrel prototypes = [</p/a>, </p/b>, </p/c>]\n" CUBE(
+      "a", "") CUBE("b", "double size = 3") CUBE("c", "double size = 4") CUBE("d", "double size = 5") "}\n";
+  write_file(weak, below, strlen(below));
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t index = 0; index < strlen(cases[i].order); index++) {
+      snprintf(text, sizeof text,
+               "#usda 1.0\n( subLayers = [@./weak.usda@] )\nover \"p\" {\n%s\nint[] protoIndices = [%zu]\n"
+               "point3f[] positions = [(0, 0, 0)]\n}\n",
+               cases[i].edit, index);
+      reading r = read_at(scene, text, "all");
+      assert_int_equal(r.status, QMAT_OK);
+      assert_int_equal(r.scene->placement_paths[0][3], cases[i].order[index]);
+      release(&r);
+    }
+  }
+  unlink(weak);
+  rmdir(folder);
+}
+
+/* Thousands of relative targets below a prim with a long name are refused before they fill the memory. */
+static void test_targets_with_too_many_bytes_are_refused(void **state) {
+  (void)state;
+  enum { NAME = 60000, TARGETS = 1500 };
+  char *text = malloc(NAME + 16 * TARGETS + 512);
+  assert_non_null(text);
+  int used = sprintf(text, "#usda 1.0\ndef PointInstancer \"");
+  memset(text + used, 'n', NAME);
+  used += NAME;
+  used += sprintf(text + used, "\" {\nint[] protoIndices = [0]\nrel prototypes = [");
+  for (int i = 0; i < TARGETS; i++) used += sprintf(text + used, "<a%d>, ", i);
+  sprintf(text + used, "]\n}\n");
+  reading r = read_choice(text, "all");
+  assert_int_equal(r.status, QMAT_ERROR_FORMAT);
+  assert_non_null(strstr(r.context.error.message, "the targets of a relationship have paths of more than"));
+  release(&r);
+  free(text);
+}
+
+/* An instancer with an error is left out of a scene that has more; its prototypes count one way or the other. */
+static void test_a_broken_instancer_is_left_out_of_a_scene_with_more(void **state) {
+  (void)state;
+  reading r = read_all("#usda 1.0\n" CUBE("first", "") INSTANCER(TWO "int[] protoIndices = [0, 5]\n")
+                           CUBE("last", "double size = 4"));
+  assert_int_equal(r.scene->placement_count, 2);
+  assert_place(&r, 0, 0, "/first", 0, 0, 0);
+  assert_place(&r, 1, 1, "/last", 0, 0, 0);
+  assert_string_equal(warning_of(&r, 0),
+                      "/many: left out with all its instances: instance 1 has prototype 5, but there are 2");
+  assert_string_equal(warning_of(&r, 1), "");
+  assert_int_equal(r.context.error.status, QMAT_OK);
+  release(&r);
+}
+
 /* Places of all kinds come back through a glTF file as they were: also mirrors, and what shears. */
 static void test_places_in_gltf_are_where_the_scene_has_them(void **state) {
   (void)state;
@@ -348,7 +446,7 @@ static qmat_file *write_layer(reading *r, const qmat_medial *medial, const qmat_
                             .skin = skin,
                             .options = {.form = form, .name = "thing", .prim = r->meshes.names[i], .moved = 1e-3}};
   qmat_file *file;
-  if (qmat_usd_write_layer(&r->context, r->scene, additions, r->meshes.count, &file) != QMAT_OK)
+  if (qmat_usd_write_layer(&r->context, r->scene, additions, r->meshes.count, NULL, &file) != QMAT_OK)
     fail_msg("%s", r->context.error.message);
   return file;
 }
@@ -542,6 +640,108 @@ static void test_names_of_added_prims_are_new_and_earlier_medial_meshes_are_hidd
   release(&r);
 }
 
+/* Saves a file and reads its only medial mesh. The files are removed again. */
+static size_t spheres_of_saved(const qmat_file *file, const char *folder) {
+  char path[256], side[300];
+  snprintf(path, sizeof path, "%s/over.usda", folder);
+  snprintf(side, sizeof side, "%s/%s", folder, file->parts[1].name);
+  qmat_context context = {0};
+  qmat_bytes bytes;
+  qmat_medial *found;
+  assert_int_equal(qmat_file_save(&context, file, path), QMAT_OK);
+  assert_int_equal(qmat_bytes_read_file(&context, path, &bytes), QMAT_OK);
+  if (qmat_usd_read_medial(&context, &bytes, path, NULL, &found, NULL) != QMAT_OK)
+    fail_msg("%s", context.error.message);
+  const size_t count = found->sphere_count;
+  qmat_value_release(&found->base);
+  qmat_bytes_uninit(&bytes);
+  qmat_context_uninit(&context);
+  unlink(path);
+  unlink(side);
+  return count;
+}
+
+/* A layer of an earlier run over one cube, with cones, a skin and colliders. */
+static const char earlier[] =
+    "#usda 1.0\n( defaultPrim = \"a\" )\n"
+    "class Xform \"medial_0\" ( customData = { string qmat_version = \"0.3.0\" string qmat_prim = \"/a/c\" } ) {\n"
+    "def Mesh \"skin\" { point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\nint[] faceVertexCounts = [3]\n"
+    "int[] faceVertexIndices = [0, 1, 2] }\n"
+    "def Points \"spheres\" { point3f[] points = [(0, 0, 0), (1, 0, 0)]\nfloat[] primvars:radius = [1, 1] }\n"
+    "def BasisCurves \"cones\" { int[] primvars:qmat:sphere = [0, 1] }\n"
+    "def Scope \"colliders\" { def Sphere \"shape_01\" { uniform token purpose = \"guide\" } }\n}\n"
+    "def Xform \"a\" {\n" CUBE("c", "def Xform \"medial_0\" ( references = </medial_0> ) {}") "}\n";
+
+/* A layer over a scene that refers to layers of earlier runs hides what these have added: cones, skins and colliders of
+ * it would be parts of the new medial mesh, too. */
+static void test_additions_of_layers_that_a_scene_refers_to_are_hidden(void **state) {
+  (void)state;
+  char folder[64], asset[256], scene[256];
+  make_folder(folder);
+  snprintf(asset, sizeof asset, "%s/asset.usda", folder);
+  snprintf(scene, sizeof scene, "%s/scene.usda", folder);
+  write_file(asset, earlier, strlen(earlier));
+  reading r =
+      read_at(scene,
+              "#usda 1.0\ndef Xform \"w\" {\ndef \"x\" ( references = @asset.usda@ ) {}\n"
+              "def \"y\" ( references = @asset.usda@ ) { over \"c\" { over \"medial_0\" ( active = false ) {} } }\n"
+              "}\n",
+              "all");
+  assert_int_equal(r.status, QMAT_OK);
+  assert_int_equal(r.scene->placement_count, 2); /* not the skins */
+  qmat_medial *medial = example_medial(1);
+  qmat_file *file = write_layer(&r, medial, NULL, QMAT_USD_TEXT);
+  char *text = text_of(file);
+#define OVER(name, hidden)                                                                                    \
+  "    over \"" name "\"\n    {\n        over \"c\"\n        {\n" hidden                                      \
+  "            def Xform \"medial2_0\" (\n                prepend references = </medial2_0>\n            )\n" \
+  "            {\n            }\n        }\n    }\n"
+  assert_non_null(
+      strstr(text, "over \"w\"\n{\n" OVER("x",
+                                          "            over \"medial_0\" (\n                active = false\n"
+                                          "            )\n            {\n            }\n") OVER("y", "") "}\n"));
+#undef OVER
+  assert_int_equal(spheres_of_saved(file, folder), 1);
+  qmat_free(text);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+  release(&r);
+  unlink(asset);
+  assert_int_equal(rmdir(folder), 0);
+}
+
+/* The medial mesh of a variant stays when another one is selected: a warning names the prim and the variant. */
+static void test_a_shape_of_a_variant_is_named_when_a_layer_is_written(void **state) {
+  (void)state;
+  reading r = read_all(
+      "#usda 1.0\nclass \"bits\" {\n" CUBE("far", "double size = 3") "}\n"
+      "def Xform \"m\" ( variants = { string look = \"red\" string size = \"big\" }\n"
+      "prepend variantSets = [\"look\", \"size\"] ) {\n" CUBE("always", "")
+      "variantSet \"look\" = { \"red\" {" CUBE("inner", "") "over \"always\" { color3f[] primvars:displayColor = [(1, 0, 0)] }\n"
+      "def \"deep\" ( references = </bits> ) {} } \"blue\" { } }\n"
+      "variantSet \"size\" = { \"big\" { def \"from\" ( references = </bits> ) {} } }\n}\n" CUBE("plain", ""));
+  assert_int_equal(r.scene->placement_count, 5);
+  qmat_medial *medial = example_medial(1);
+  qmat_usd_addition additions[2];
+  for (int i = 0; i < 2; i++)
+    additions[i] = (qmat_usd_addition){.medial = medial, .options = {.prim = r.meshes.names[i], .moved = 1e-3}};
+  json_t *report = json_object();
+  qmat_file *file;
+  assert_int_equal(r.meshes.count, 2);
+  assert_int_equal(qmat_usd_write_layer(&r.context, r.scene, additions, 2, report, &file), QMAT_OK);
+  const json_t *warnings = json_object_get(report, "warnings");
+  assert_int_equal(json_array_size(warnings), 3);
+  static const char *const expected[] = {"/m/deep/far: its shape is that of the variant 'red' of 'look', but",
+                                         "/m/from/far: its shape is that of the variant 'big' of 'size', but",
+                                         "/m/inner: its shape is that of the variant 'red' of 'look', but"};
+  for (size_t i = 0; i < 3; i++)
+    assert_memory_equal(json_string_value(json_array_get(warnings, i)), expected[i], strlen(expected[i]));
+  json_decref(report);
+  qmat_value_release(&file->base);
+  qmat_value_release(&medial->base);
+  release(&r);
+}
+
 /* The numbers after `key` in what the layer says of the prim that `over` opens; NAN where it says nothing there. */
 static void numbers_of(const char *text, const char *over, const char *key, double numbers[3]) {
   const char *prim = strstr(text, over), *at = prim ? strstr(prim, key) : NULL;
@@ -588,7 +788,7 @@ static void test_prims_with_colliders_are_bodies_with_the_mass_of_their_place(vo
                                                     .dynamic = dynamic,
                                                     .colliders = &colliders}};
     qmat_file *file;
-    assert_int_equal(qmat_usd_write_layer(&r.context, r.scene, &addition, 1, &file), QMAT_OK);
+    assert_int_equal(qmat_usd_write_layer(&r.context, r.scene, &addition, 1, NULL, &file), QMAT_OK);
     char *text = text_of(file);
     const char *class_end = strstr(text, "\n}\n");
     assert_non_null(strstr(text, "def Scope \"colliders\""));
@@ -630,10 +830,16 @@ int main(void) {
       cmocka_unit_test(test_inactive_instances_and_those_of_proxies_are_left_out),
       cmocka_unit_test(test_prototypes_are_found_through_references_and_instancers_nest),
       cmocka_unit_test(test_broken_instancers_are_errors_that_name_the_prim),
+      cmocka_unit_test(test_targets_that_an_edit_repeats_count_once),
+      cmocka_unit_test(test_targets_are_edited_from_weak_to_strong),
+      cmocka_unit_test(test_targets_with_too_many_bytes_are_refused),
+      cmocka_unit_test(test_a_broken_instancer_is_left_out_of_a_scene_with_more),
       cmocka_unit_test(test_places_in_gltf_are_where_the_scene_has_them),
       cmocka_unit_test(test_a_layer_adds_medial_meshes_and_takes_nothing),
       cmocka_unit_test(test_tiles_are_kept_and_other_files_are_named),
       cmocka_unit_test(test_the_prims_of_a_layer_are_opened_once),
+      cmocka_unit_test(test_additions_of_layers_that_a_scene_refers_to_are_hidden),
+      cmocka_unit_test(test_a_shape_of_a_variant_is_named_when_a_layer_is_written),
       cmocka_unit_test(test_prims_with_colliders_are_bodies_with_the_mass_of_their_place),
       cmocka_unit_test(test_a_transform_is_split_into_a_rotation_and_a_plain_one),
   };

@@ -2,6 +2,7 @@
 #include "io/usd/usd_scene.h"
 
 #include <sys/stat.h>
+#include <time.h>
 
 #include "io/usd/usdz.h"
 #include "tests/io/files.h"
@@ -743,6 +744,112 @@ static void test_real_assets_are_read_whole_or_refused_by_name(void **state) {
   qmat_context_uninit(&context);
 }
 
+/* The name of a class with as many variant sets as a prim may have, and prims that inherit it. */
+static char *many_variant_sets(int heirs) {
+  enum { SETS = 4096, ROOM = 32 };
+  char *text = malloc((size_t)(SETS + heirs + 8) * ROOM);
+  assert_non_null(text);
+  int used = sprintf(text, "#usda 1.0\n( subLayers = [@./sets.usda@] )\nover \"c\" ( prepend variantSets = [");
+  for (int i = 0; i < SETS / 2; i++) used += sprintf(text + used, "\"s%d\", ", i);
+  used += sprintf(text + used, "] ) {}\n");
+  for (int i = 0; i < heirs; i++) used += sprintf(text + used, "def \"h%d\" ( inherits = </c> ) {}\n", i);
+  sprintf(text + used, "def Mesh \"m\" {\n" TRIANGLE "}\n");
+  FILE *file = fopen(in_folder("sets.usda"), "wb");
+  assert_non_null(file);
+  fprintf(file, "#usda 1.0\nclass \"c\" ( append variantSets = [");
+  for (int i = 0; i < SETS / 2; i++) fprintf(file, "\"t%d\", ", i);
+  fprintf(file, "] ) {}\n");
+  fclose(file);
+  return text;
+}
+
+static bool stop_after(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
+                       const char *unit) {
+  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
+  int *left = user;
+  return --*left > 0;
+}
+
+static void test_long_lists_take_little_time_and_can_be_cancelled(void **state) {
+  (void)state;
+  char *text = many_variant_sets(400);
+  const clock_t start = clock();
+  json_t *report;
+  qmat_soup soup = good_scene(text, &report);
+  /* Without an order of the items this takes four million comparisons a prim, which is ten times as long. */
+  assert_true((double)(clock() - start) / CLOCKS_PER_SEC < 4);
+  assert_int_equal(count_of(report, "meshes_placed"), 1);
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+  /* The first prims are not a thousand: only the lists' own steps ask whether to go on. */
+  int left = 1;
+  qmat_context context = {.progress = stop_after, .progress_user = &left};
+  assert_int_equal(read_text(&context, text, &soup, NULL), QMAT_CANCELLED);
+  qmat_soup_uninit(&soup);
+  qmat_context_uninit(&context);
+  free(text);
+  unlink(in_folder("sets.usda"));
+}
+
+/* Prototypes without instances are not even composed. */
+static void test_only_prototypes_with_instances_are_read(void **state) {
+  (void)state;
+  enum { PROTOTYPES = 2000 };
+  char *text = malloc(PROTOTYPES * 16 + 1024);
+  assert_non_null(text);
+  int used = sprintf(text, "#usda 1.0\ndef PointInstancer \"p\" {\nrel prototypes = [");
+  for (int i = 0; i < PROTOTYPES; i++) used += sprintf(text + used, "</p/m>, ");
+  sprintf(text + used,
+          "]\nint[] protoIndices = [1999, 7, 1999]\npoint3f[] positions = [(1, 0, 0), (2, 0, 0), (3, 0, 0)]\n"
+          "def Mesh \"m\" {\n" TRIANGLE "}\n}\n");
+  json_t *report;
+  qmat_soup soup = good_scene(text, &report);
+  assert_int_equal(soup.vertex_count, 9);
+  assert_true(soup.positions[0] == 2 && soup.positions[9] == 1 && soup.positions[18] == 3);
+  assert_int_equal(count_of(report, "prims_read"), 3);
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+  free(text);
+}
+
+/* What is no unit and no axis has a warning each, and the defaults of USD take its place. */
+static void test_units_and_axes_that_are_none_are_named(void **state) {
+  (void)state;
+  static const char *const units[] = {"0", "-1", "inf", "nan"};
+  for (size_t i = 0; i < 4; i++) {
+    char text[512];
+    snprintf(text, sizeof text, "#usda 1.0\n( metersPerUnit = %s upAxis = \"X\" )\n" MESH("m", ""), units[i]);
+    json_t *report;
+    qmat_soup soup = good_scene(text, &report);
+    assert_string_equal(warning_of(report, 0), "/: metersPerUnit is no length: 0.01 is used");
+    assert_string_equal(warning_of(report, 1), "/: upAxis is 'X', not Y or Z: Y is used");
+    assert_string_equal(warning_of(report, 2), "");
+    assert_true(json_real_value(json_object_get(report, "meters_per_unit")) == 0.01);
+    assert_string_equal(json_string_value(json_object_get(report, "up_axis")), "Y");
+    qmat_soup_uninit(&soup);
+    json_decref(report);
+  }
+  json_t *report;
+  qmat_soup soup = good_scene("#usda 1.0\n( metersPerUnit = 2 upAxis = \"Z\" )\n" MESH("m", ""), &report);
+  assert_string_equal(warning_of(report, 0), "");
+  assert_true(json_real_value(json_object_get(report, "meters_per_unit")) == 2);
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
+static void test_expressions_in_asset_paths_are_named(void **state) {
+  (void)state;
+  json_t *report;
+  qmat_soup soup = good_scene(
+      "#usda 1.0\n( expressionVariables = { string V = \"a\" } )\n"
+      "def \"x\" ( references = @`\"./${V}.usda\"`@ ) {}\n" MESH("m", ""),
+      &report);
+  assert_string_equal(warning_of(report, 0),
+                      "/x: the reference @`\"./${V}.usda\"`@ is skipped: variable expressions are not read");
+  qmat_soup_uninit(&soup);
+  json_decref(report);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_every_operation_moves_a_point_as_by_hand),
@@ -768,6 +875,10 @@ int main(void) {
       cmocka_unit_test(test_samples_over_time_give_the_first_with_a_warning),
       cmocka_unit_test(test_broken_meshes_are_errors_that_name_the_prim),
       cmocka_unit_test(test_references_that_multiply_are_stopped),
+      cmocka_unit_test(test_long_lists_take_little_time_and_can_be_cancelled),
+      cmocka_unit_test(test_only_prototypes_with_instances_are_read),
+      cmocka_unit_test(test_units_and_axes_that_are_none_are_named),
+      cmocka_unit_test(test_expressions_in_asset_paths_are_named),
       cmocka_unit_test(test_a_package_is_read_and_its_members_refer_to_each_other),
       cmocka_unit_test(test_real_assets_are_read_whole_or_refused_by_name),
   };

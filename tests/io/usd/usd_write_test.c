@@ -209,6 +209,71 @@ static void test_broken_medial_meshes_are_errors_that_name_the_prim(void **state
   }
 }
 
+/* The number of spheres of the medial mesh that is called so; with 0 the error's message and hint are as expected. */
+static size_t spheres_of(const char *text, const char *name, json_t *facts, const char *message, const char *hint) {
+  qmat_context context = {0};
+  qmat_medial *medial;
+  qmat_bytes bytes = memory_file(text, strlen(text));
+  size_t count = 0;
+  if (qmat_usd_read_medial(&context, &bytes, "file", name, &medial, facts) == QMAT_OK) {
+    count = medial->sphere_count;
+    qmat_value_release(&medial->base);
+  } else {
+    assert_string_equal(context.error.message, message ? message : "");
+    assert_string_equal(context.error.hint, hint ? hint : "");
+  }
+  free(bytes.data);
+  qmat_context_uninit(&context);
+  return count;
+}
+
+/* Two layers were written over two scenes, and each calls its medial mesh medial_0. */
+#define MEDIAL(name, prim, points, radii)                                                            \
+  "class Xform \"" name "\" ( customData = { string qmat_version = \"1\" string qmat_prim = \"" prim \
+  "\" } ) { def Points \"spheres\" { point3f[] points = [" points "] float[] primvars:radius = [" radii "] } }\n"
+static const char two_assets[] =
+    "#usda 1.0\nclass \"lib\" ( active = false ) {\n" MEDIAL("one", "/old/Q", "(0, 0, 0)", "1")
+        MEDIAL("two", "/old/P", "(0, 0, 0), (1, 0, 0)", "1, 1") "}\n"
+    "def \"R\" {\ndef \"render\" {\ndef \"Q\" { def \"medial_0\" ( references = </lib/one> ) {} }\n"
+    "def \"again\" { def \"medial_0\" ( references = </lib/one> ) {} }\n}\n"
+    "def \"P\" { def \"medial_0\" ( references = </lib/two> ) {} }\n"
+    "def \"off\" { def \"medial_0\" ( references = </lib/two>\nactive = false ) {} }\n}\n";
+
+static void test_a_medial_mesh_is_named_by_the_path_of_a_prim(void **state) {
+  (void)state;
+  static const struct {
+    const char *name;
+    size_t spheres;
+  } cases[] = {{"medial_0", 1}, {"/R/P/medial_0", 2}, {"/R/render/Q", 1}, {"render/Q", 1},   {"Q", 1},
+               {"again", 1},    {"/R/P", 2},          {"P", 2},           {"P/medial_0", 2}, {"Q/medial_0", 1}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+    assert_int_equal(spheres_of(two_assets, cases[i].name, NULL, NULL, NULL), cases[i].spheres);
+  static const char hint[] = "--node with a name or the path of a prim: medial_0 of /R/render/Q, /R/P/medial_0 of /R/P";
+  assert_int_equal(spheres_of(two_assets, NULL, NULL, "2 prims have a medial mesh: name one of them", hint), 0);
+  static const char *const none[] = {"off", "R", "nder/Q", "/R", ""};
+  for (size_t i = 0; i < sizeof none / sizeof *none; i++)
+    assert_int_equal(spheres_of(two_assets, none[i], NULL, "no prim of this name has a medial mesh", hint), 0);
+}
+
+/* A stage that refers to another one does not have the prim that the medial mesh was made for, but its own. */
+static void test_facts_name_the_prim_of_this_stage(void **state) {
+  (void)state;
+  json_t *facts = json_object();
+  assert_int_equal(spheres_of(two_assets, "P", facts, NULL, NULL), 2);
+  assert_string_equal(json_string_value(json_object_get(facts, "qmat_prim")), "/old/P");
+  assert_string_equal(json_string_value(json_object_get(facts, "composed_prim")), "/R/P");
+  json_object_clear(facts);
+  assert_int_equal(spheres_of(two_assets, "again", facts, NULL, NULL), 1);
+  assert_string_equal(json_string_value(json_object_get(facts, "composed_prim")), "/R/render/again");
+  json_object_clear(facts);
+  assert_int_equal(spheres_of("#usda 1.0\n" MEDIAL("m", "/a", "(0, 0, 0)", "1") "def \"a\" { def \"m\" ( references = "
+                                                                                "</m> ) {} }\n",
+                              NULL, facts, NULL, NULL),
+                   1);
+  assert_null(json_object_get(facts, "composed_prim"));
+  json_decref(facts);
+}
+
 static void test_facts_keep_whole_numbers_and_skip_what_json_has_not(void **state) {
   (void)state;
   static const char text[] =
@@ -237,6 +302,8 @@ int main(void) {
       cmocka_unit_test(test_a_scene_reader_sees_the_skin_only),
       cmocka_unit_test(test_what_single_precision_cannot_hold_is_refused_by_its_element),
       cmocka_unit_test(test_broken_medial_meshes_are_errors_that_name_the_prim),
+      cmocka_unit_test(test_a_medial_mesh_is_named_by_the_path_of_a_prim),
+      cmocka_unit_test(test_facts_name_the_prim_of_this_stage),
       cmocka_unit_test(test_facts_keep_whole_numbers_and_skip_what_json_has_not),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

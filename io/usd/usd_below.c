@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/usd/usd_below.h"
+
+#include <string.h>
+
+#include "io/usd/usd_files.h"
+#include "io/usd/usdz.h"
+
+qmat_status qmat_usd_below_open(qmat_context *context, const qmat_file_part *part, qmat_usd_below *below) {
+  *below = (qmat_usd_below){.prims = qmat_calloc(QMAT_USD_DEEPEST + 1, sizeof *below->prims)};
+  if (!below->prims) return qmat_fail_memory(context, "the output file");
+  qmat_bytes bytes = {.data = part->bytes, .size = part->size};
+  if (!qmat_usdz_is_package(part->bytes, part->size)) {
+    /* A package refers to nothing outside of it. */
+    qmat_usdz_put(&below->package, "scene.usd", part->bytes, part->size);
+    if (below->package.failed) return qmat_fail_memory(context, "the output file");
+    bytes = (qmat_bytes){.data = below->package.bytes, .size = below->package.size};
+  }
+  const qmat_status status = qmat_usd_stage_open(context, &bytes, "the scene", &below->stage);
+  return status == QMAT_OK ? qmat_usd_stage_root(below->stage, &below->prims[0]) : status;
+}
+
+/* Closes the prims below a depth. */
+static void close_prims(qmat_usd_below *below, size_t depth) {
+  for (; below->depth > depth; below->depth--) qmat_usd_prim_uninit(&below->prims[below->depth]);
+}
+
+void qmat_usd_below_close(qmat_usd_below *below) {
+  if (below->prims) {
+    close_prims(below, 0);
+    qmat_usd_prim_uninit(&below->prims[0]);
+  }
+  qmat_free(below->prims);
+  qmat_usd_stage_close(below->stage);
+  qmat_writer_uninit(&below->package);
+  qmat_arena_uninit(&below->arena);
+  *below = (qmat_usd_below){0};
+}
+
+/* Composes the prims of a path, but for those that are open. `*found`: all of them are there. */
+static qmat_status open_prims(qmat_usd_below *below, const char *path, bool *found) {
+  size_t depth = 0;
+  *found = true;
+  while (*path && *found) {
+    const size_t length = strcspn(++path, "/");
+    const char *open = depth < below->depth ? below->prims[depth + 1].name : NULL;
+    if (!open || strncmp(open, path, length) != 0 || open[length] != '\0') {
+      const char *name;
+      close_prims(below, depth);
+      qmat_status status = qmat_usd_prim_find_child(&below->prims[depth], path, length, &name);
+      if (status != QMAT_OK) return status;
+      *found = name && depth < QMAT_USD_DEEPEST;
+      if (!*found) return QMAT_OK;
+      below->depth = depth + 1;
+      status = qmat_usd_prim_child(below->stage, &below->prims[depth], name, &below->prims[depth + 1]);
+      if (status != QMAT_OK) return status;
+    }
+    path += length;
+    depth++;
+  }
+  close_prims(below, depth);
+  return QMAT_OK;
+}
+
+/* Lists the children that are active medial meshes. */
+static qmat_status list_medials(qmat_usd_below *below, qmat_usd_prim *prim, qmat_usd_beneath *beneath) {
+  const char *const *names;
+  size_t count;
+  qmat_status status = qmat_usd_prim_children(prim, &names, &count);
+  const char **medials = status == QMAT_OK ? qmat_arena_alloc(&below->arena, count, sizeof *medials) : NULL;
+  if (status == QMAT_OK && !medials) status = qmat_usd_fail_prim_memory(prim);
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+    qmat_usd_prim child;
+    status = qmat_usd_prim_child(below->stage, prim, names[i], &child);
+    if (status == QMAT_OK && qmat_usd_prim_is_medial(&child) &&
+        qmat_usd_truth(qmat_usd_prim_field(&child, "active"), true))
+      medials[beneath->medial_count++] = names[i];
+    qmat_usd_prim_uninit(&child);
+  }
+  beneath->medials = medials;
+  return status;
+}
+
+/* The variant with the strongest opinion about the prim's type, or about an attribute that its shape depends on. */
+static const qmat_usd_spec *find_variant(const qmat_usd_prim *prim) {
+  static const char *const names[] = {"points", "faceVertexCounts", "faceVertexIndices", "size", "radius", "height"};
+  enum { NAMES = sizeof names / sizeof *names };
+  bool is_known[NAMES + 1] = {false};
+  for (size_t i = 0; i < prim->opinion_count; i++) {
+    const qmat_usd_opinion *opinion = &prim->opinions[i];
+    for (size_t k = 0; k <= NAMES; k++) {
+      const bool has = k < NAMES ? qmat_usd_child(opinion->layer, opinion->spec, QMAT_USD_ATTRIBUTE, names[k]) != NULL
+                                 : qmat_usd_field_value(opinion->spec, "typeName") != NULL;
+      if (has && !is_known[k] && opinion->variant) return opinion->variant;
+      is_known[k] = is_known[k] || has;
+    }
+  }
+  return NULL;
+}
+
+qmat_status qmat_usd_below_find(qmat_usd_below *below, const char *path, qmat_usd_beneath *beneath) {
+  bool found;
+  *beneath = (qmat_usd_beneath){0};
+  qmat_status status = open_prims(below, path, &found);
+  if (status != QMAT_OK || !found) return status;
+  qmat_usd_prim *prim = &below->prims[below->depth];
+  status = qmat_progress(prim->log->context, 1, 0, "prims");
+  if (status != QMAT_OK) return status;
+  beneath->variant = find_variant(prim);
+  return list_medials(below, prim, beneath);
+}
+
+/* Whether a prim in a layer has a name that begins so. */
+static bool has_stem(const qmat_usd_spec *root, const char *stem) {
+  const size_t length = strlen(stem);
+  for (const qmat_usd_spec *spec = root; spec;) {
+    if (spec->kind == QMAT_USD_PRIM && strncmp(spec->name, stem, length) == 0) return true;
+    const qmat_usd_spec *next = spec->first_child;
+    for (; !next && spec != root; spec = spec->parent) next = spec->next;
+    if (spec == root && !next) return false;
+    spec = next;
+  }
+  return false;
+}
+
+bool qmat_usd_below_has_stem(const qmat_usd_below *below, const char *stem) {
+  const qmat_usd_files *files = qmat_usd_stage_files(below->stage);
+  for (size_t i = 0; i < files->file_count; i++) {
+    const char *path;
+    const qmat_usd_layer *layer;
+    bool is_member;
+    qmat_usd_files_at(files, i, &path, &layer, &is_member);
+    if (layer && has_stem(layer->root, stem)) return true;
+  }
+  return false;
+}
