@@ -12,6 +12,7 @@
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/mesh/border_weld.h"
+#include "nodes/mesh/hidden_parts.h"
 #include "nodes/mesh/hole_cgal.h"
 #include "nodes/mesh/lend_joints.h"
 #include "nodes/mesh/opposite_pairs.h"
@@ -44,7 +45,7 @@ static const double least_gap = 1e-9;
 /* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
  * solids covers it then. Folds that are not longer need no union for the same reason. */
 static const double flap_reach = 0.75;
-/* If the union leaves less than this share of the triangles of solids, a part may hide the others by mistake. */
+/* If the union leaves less than this share of the other solids, one may hide them by mistake. */
 static const double least_left = 0.2;
 enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 }; /* components and caps that the report lists */
 
@@ -72,6 +73,8 @@ typedef struct solidifier {
   triangle_list solids, sheets;
   double *beside_solids; /* the vertices in the frame of the surface of the solids */
   size_t given_count;    /* of the solids' triangles; behind these are seams and caps */
+  uint32_t *solid_parts; /* their parts */
+  qmat_hidden_parts hidden;
   size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
   double cap_length, cap_area;
   qmat_united united;
@@ -209,6 +212,7 @@ static qmat_status split_folds(solidifier *s, size_t given) {
     const uint32_t *c = s->solids.corners + 3 * t;
     if (t == given) s->given_count = s->solids.count;
     if (!classes[t]) {
+      if (t < given) s->solid_parts[s->solids.count] = s->solid_parts[t];
       memmove(s->solids.corners + 3 * s->solids.count++, c, 3 * sizeof *c);
     } else if (t < given) {
       status = append(s, &s->sheets, c[0], c[1], c[2]);
@@ -224,11 +228,13 @@ static qmat_status sort_triangles(solidifier *s) {
   qmat_status status = QMAT_OK;
   size_t given = 0;
   s->cap_areas = qmat_arena_calloc(&s->context->arena, parts->loop_count, sizeof *s->cap_areas);
-  if (!s->cap_areas) return fail_shortage(s);
+  s->solid_parts = qmat_arena_alloc(&s->context->arena, parts->triangle_count, sizeof *s->solid_parts);
+  if (!s->cap_areas || !s->solid_parts) return fail_shortage(s);
   for (size_t t = 0; status == QMAT_OK && t < parts->triangle_count; t++) {
     const uint32_t *c = parts->triangles + 3 * t;
     const bool turn = s->facing[parts->part_of[t]] == QMAT_FACING_TURNED;
     triangle_list *list = qmat_part_is_sheet(&parts->parts[parts->part_of[t]]) ? &s->sheets : &s->solids;
+    if (list == &s->solids) s->solid_parts[list->count] = parts->part_of[t];
     status = append(s, list, c[0], c[turn ? 2 : 1], c[turn ? 1 : 2]);
     if (t < parts->triangle_count - parts->seam_count) given = s->solids.count;
   }
@@ -472,14 +478,21 @@ static int report_parts(const solidifier *s, json_t *root) {
   return bad | json_object_set_new(root, "components", list);
 }
 
-/* Warns where the union leaves few triangles. */
+/* Warns where the union leaves few solids, or none within a room that is seen from inside. */
 static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
-  const size_t given = s->solids.count, left = s->united.triangle_count;
-  if (!s->united.changed || (double)left >= least_left * (double)given) return 0;
+  const size_t hidden = s->hidden.parts, in_room = s->hidden.in_room;
+  size_t solids = 0;
+  for (size_t i = 0; i < s->parts.part_count; i++) solids += !qmat_part_is_sheet(&s->parts.parts[i]);
+  if (in_room > 0)
+    return qmat_json_add_warning(root,
+                                 "a part that faces inwards, such as a room seen from inside, is taken for a full "
+                                 "solid, and %zu solid%s inside it left out; --set solid.solid=sheet keeps it as walls",
+                                 in_room, in_room == 1 ? " is" : "s are");
+  if ((double)hidden <= (1 - least_left) * (double)(solids - 1) || hidden == 0) return 0;
   return qmat_json_add_warning(root,
-                               "at least %zu of %zu triangles of solids lie in or on other solids, and are left out; "
+                               "%zu of %zu solids (%zu of %zu triangles) lie in or on other solids, and are left out; "
                                "if that is not wanted, remove the part around them, such as a sky or a room",
-                               given - left, given);
+                               hidden, solids, s->hidden.triangles, s->solids.count);
 }
 
 /* Warns where caps are a large share of components, and of the model: they may be containers. */
@@ -570,6 +583,9 @@ static qmat_status make_solid(solidifier *s) {
                                  s->solids.corners, flap_reach * epsilon_of(s) * s->frame.diagonal, &s->united);
   /* The last resort: without their union, the inside of what intersects is not defined. */
   if (status == QMAT_OK && s->united.why_not) status = wrap_triangles(s, s->solids.corners, s->solids.count);
+  if (status == QMAT_OK && s->united.changed)
+    status = qmat_count_hidden_parts(s->context, &s->parts, s->facing, s->given_count, s->solid_parts, s->united.fates,
+                                     &s->hidden);
   return status == QMAT_OK ? review_sheets(s) : status;
 }
 
@@ -592,6 +608,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_free(s.united.positions);
   qmat_free(s.united.triangles);
   qmat_free(s.united.is_cut);
+  qmat_free(s.united.fates);
   qmat_free(s.wrap.positions);
   qmat_free(s.wrap.triangles);
   qmat_free(s.solids.corners);

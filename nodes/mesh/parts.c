@@ -374,6 +374,18 @@ static qmat_status find_loops(division *d) {
 
 /* ---- what a part is ---- */
 
+void qmat_part_grow_box(const qmat_parts *parts, size_t part, double box[6]) {
+  const qmat_part *of = &parts->parts[part];
+  for (size_t i = 0; i < 3 * of->triangle_count; i++) {
+    const uint32_t t = parts->members[of->first_member + i / 3];
+    const double *p = parts->positions + 3 * (size_t)parts->triangles[3 * (size_t)t + i % 3];
+    for (size_t k = 0; k < 3; k++) {
+      box[k] = fmin(box[k], p[k]);
+      box[3 + k] = fmax(box[3 + k], p[k]);
+    }
+  }
+}
+
 double qmat_seen_share(const double *from, const double *a, const double *b, const double *c) {
   double p[3], q[3], r[3], product[3];
   qmat_subtract(a, from, p);

@@ -65,6 +65,10 @@ static inline bool qmat_part_is_sheet(const qmat_part *part) {
   return part->kind == QMAT_PART_OPEN || part->kind == QMAT_PART_FLAT;
 }
 
+/* Grows a box (the least x, y, z, then the largest; INFINITY and -INFINITY where it is empty) by the corners of a part.
+ */
+void qmat_part_grow_box(const qmat_parts *parts, size_t part, double box[6]);
+
 /* The share of all directions in which the triangle abc is seen from a point, all 3 doubles; positive from its back.
  * Over a surface these sum up to its generalised winding number. Source: van Oosterom, Strackee 1983. */
 double qmat_seen_share(const double *from, const double *a, const double *b, const double *c);

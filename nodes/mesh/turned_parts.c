@@ -46,17 +46,6 @@ static const double *corner(const turner *t, uint32_t triangle, size_t k) {
 
 /* ---- parts near each other ---- */
 
-static void fill_box(const turner *t, const qmat_part *part, double *box) {
-  for (size_t k = 0; k < 3; k++) box[k] = INFINITY, box[3 + k] = -INFINITY;
-  for (size_t i = 0; i < 3 * part->triangle_count; i++) {
-    const double *p = corner(t, t->parts->members[part->first_member + i / 3], i % 3);
-    for (size_t k = 0; k < 3; k++) {
-      box[k] = fmin(box[k], p[k]);
-      box[3 + k] = fmax(box[3 + k], p[k]);
-    }
-  }
-}
-
 static qmat_status list_parts(turner *t) {
   qmat_arena *arena = &t->context->arena;
   const size_t count = t->parts->part_count;
@@ -70,7 +59,8 @@ static qmat_status list_parts(turner *t) {
     const qmat_part *part = &t->parts->parts[i];
     if (qmat_part_is_sheet(part)) continue;
     double *box = t->boxes + 6 * t->solid_count;
-    fill_box(t, part, box);
+    for (size_t k = 0; k < 3; k++) box[k] = INFINITY, box[3 + k] = -INFINITY;
+    qmat_part_grow_box(t->parts, i, box);
     t->slots[i] = (uint32_t)t->solid_count;
     t->solids[t->solid_count++] = i;
     if (part->volume >= 0) continue;
