@@ -484,10 +484,11 @@ static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
   size_t solids = 0;
   for (size_t i = 0; i < s->parts.part_count; i++) solids += !qmat_part_is_sheet(&s->parts.parts[i]);
   if (in_room > 0)
-    return qmat_json_add_warning(root,
-                                 "a part that faces inwards, such as a room seen from inside, is taken for a full "
-                                 "solid, and %zu solid%s inside it left out; --set solid.solid=sheet keeps it as walls",
-                                 in_room, in_room == 1 ? " is" : "s are");
+    return qmat_json_add_warning(
+        root,
+        "a part that faces inwards, such as a room seen from inside, is taken for a full "
+        "solid, and %zu solid%s inside it %s left out; --set solid.solid=sheet keeps the walls",
+        in_room, in_room == 1 ? "" : "s", in_room == 1 ? "is" : "are");
   if ((double)hidden <= (1 - least_left) * (double)(solids - 1) || hidden == 0) return 0;
   return qmat_json_add_warning(root,
                                "%zu of %zu solids (%zu of %zu triangles) lie in or on other solids, and are left out; "

@@ -251,7 +251,7 @@ class Union {
       const bool keeps = kept[region_of_[i]];
       if (!changed_[cluster_of(pieces_[i].source)]) continue;
       qmat_fate &fate = fates_[pieces_[i].source];
-      if (pieces_[i].layers == 1 || !keeps) fate = std::max(fate, keeps ? QMAT_FATE_SHOWN : QMAT_FATE_HIDDEN);
+      if (!arrangement_.overlaps[pieces_[i].source]) fate = std::max(fate, keeps ? QMAT_FATE_SHOWN : QMAT_FATE_HIDDEN);
       if (keeps) pieces_[count++] = pieces_[i];
     }
     pieces_.resize(count);

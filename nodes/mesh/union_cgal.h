@@ -11,9 +11,9 @@ extern "C" {
 
 /* What became of a triangle. */
 typedef enum qmat_fate {
-  QMAT_FATE_SHARED, /* other triangles cover what may be left of it */
-  QMAT_FATE_HIDDEN, /* a piece lies inside the union, and no piece is left but for shared ones */
-  QMAT_FATE_SHOWN   /* a piece bounds the union */
+  QMAT_FATE_SHARED, /* others of its plane overlap it: what is left is not counted as its own */
+  QMAT_FATE_HIDDEN, /* all of it lies inside the union */
+  QMAT_FATE_SHOWN   /* a piece of it bounds the union */
 } qmat_fate;
 
 /* The result. */
