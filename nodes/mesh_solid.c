@@ -631,8 +631,8 @@ static const qmat_param params[] = {
     QMAT_LENGTH(mesh_solid_params, thickness, 0, 0, 1, "The thickness of sheets"),
     QMAT_LENGTH(
         mesh_solid_params, epsilon, 0.01, 0, 1,
-        "The epsilon of the run. A wrap lies a quarter of it outside the surface; three quarters of it are the longest "
-        "fold that stays, and how far a flap sticks out; 0: 1% is used"),
+        "The epsilon of the run. A wrap lies a quarter of it outside the surface. Folds up to three quarters of it "
+        "stay, and a sheet that sticks out by no more is a flap. 0: 1%"),
     {0},
 };
 
@@ -658,13 +658,15 @@ const qmat_node qmat_node_mesh_solid = {
         "own. Border vertices 1e-5 diagonals apart are one. A closed component is a solid. The borders of an open one "
         "are closed by caps if the generalised winding number is near 0 or 1 along most of it; else it is a sheet, a "
         "surface without volume. A warning says where caps are more than a tenth of a component's area, such as the "
-        "lid of a box. A tooth of a border that its cap folds back on is a sheet, too. Borders that run along each "
-        "other within a fifth of epsilon, such as those of mirrored halves, are joined by triangles where that makes "
-        "a solid much thicker than the seam is wide. Of triangles that coincide with opposite sides one is kept. A "
+        "lid of a box. A tooth of a border that its cap folds back on is a sheet, too. Border edges are split at "
+        "border "
+        "vertices that lie on them within 1e-5 diagonals (T-junctions), and borders that run along each other within "
+        "a fifth of epsilon, such as those of mirrored halves, are joined by triangles, where that makes a solid much "
+        "thicker than the seam is wide. Of triangles that coincide with opposite sides one is kept. A "
         "closed surface that is given with both sides is a solid. What faces inwards and is no cavity is turned.\n\n"
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Blocks whose sides "
-        "touch become one; sides up to 1e-6 diagonals apart do. Cavities stay. Sheets inside a solid are left out. "
+        "touch, or are at most 1e-6 diagonals apart, become one. Cavities stay. Sheets inside a solid are left out. "
         "Disjoint solids stay as they are. Where a part crosses itself, some of its triangles, such as those of a "
         "folded cuff, may have the outside on both sides: they become sheets. A part that crosses only itself, in "
         "folds of at most three quarters of epsilon, stays as it is.\n\n"
@@ -674,7 +676,8 @@ const qmat_node qmat_node_mesh_solid = {
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
         "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says where "
-        "solids hide most others, such as a sky around a scene.",
+        "a solid hides most others, such as a sky around a scene, or a room that is seen from inside hides any. A part "
+        "that faces inwards is a cavity where other solids are around most of it, whatever touches it from inside.",
     .citation = "Jacobson et al. 2013; Zhou et al. 2016, Mesh arrangements for solid geometry",
     .params_size = sizeof(mesh_solid_params),
     .params = params,
