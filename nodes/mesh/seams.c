@@ -192,8 +192,8 @@ static double open_length(const qmat_parts *parts, const qmat_part *part) {
 }
 
 static bool stays(const qmat_parts *parts, const qmat_part *part, const joined_part *joined) {
-  return !qmat_part_is_sheet(part) && (joined->has_sheets || part->loop_count == 0) &&
-         open_length(parts, part) <= joined->length &&
+  const double open = open_length(parts, part);
+  return !qmat_part_is_sheet(part) && (joined->has_sheets || part->loop_count == 0) && open <= joined->length &&
          2 * fabs(part->volume) >= least_thickness * joined->width * part->area;
 }
 

@@ -1500,12 +1500,13 @@ static void test_a_part_that_hides_all_others_is_a_warning(void **state) {
   }
 }
 
-/* A room that is seen from inside, with two boxes on its floor and one above it. `inward`: as it is given; else all is
- * turned, as reading turns a model of a negative volume. A larger box is beside it. */
+/* A room that is seen from inside, with two boxes on its floor and one above it. `sunk`: the two stick out of the
+ * floor, and one of a wall. `inward`: as it is given; else all is turned, as reading turns a model of a negative
+ * volume. A larger box is beside it. */
 static qmat_mesh *room(bool inward, double sunk) {
   qmat_mesh *mesh = shape_new();
   shape_add_box(mesh, 0, 0, 0, 5, 4, 2.7, inward);
-  shape_add_box(mesh, 1, 1, -sunk, 2, 2, 0.8, !inward);
+  shape_add_box(mesh, sunk > 0 ? -sunk : 1, 1, -sunk, 2, 2, 0.8, !inward);
   shape_add_box(mesh, 3, 0.2, -sunk, 4.8, 1, 1, !inward);
   shape_add_box(mesh, 2.5, 2.5, 0.3, 3.5, 3.5, 1, !inward);
   shape_add_box(mesh, 10, 0, 0, 15, 5, 5, false);
