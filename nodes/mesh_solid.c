@@ -486,8 +486,8 @@ static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
   if (in_room > 0)
     return qmat_json_add_warning(
         root,
-        "a part that faces inwards, such as a room seen from inside, is taken for a full "
-        "solid, and %zu solid%s inside it %s left out; --set solid.solid=sheet keeps the walls",
+        "a part that faces inwards, such as a room seen from inside, is taken for a full solid, and %zu solid%s inside "
+        "it %s left out; --set solid.solid=sheet keeps the walls",
         in_room, in_room == 1 ? "" : "s", in_room == 1 ? "is" : "are");
   if ((double)hidden <= (1 - least_left) * (double)(solids - 1) || hidden == 0) return 0;
   return qmat_json_add_warning(root,
@@ -659,10 +659,9 @@ const qmat_node qmat_node_mesh_solid = {
         "are closed by caps if the generalised winding number is near 0 or 1 along most of it; else it is a sheet, a "
         "surface without volume. A warning says where caps are more than a tenth of a component's area, such as the "
         "lid of a box. A tooth of a border that its cap folds back on is a sheet, too. Border edges are split at "
-        "border "
-        "vertices that lie on them within 1e-5 diagonals (T-junctions), and borders that run along each other within "
-        "a fifth of epsilon, such as those of mirrored halves, are joined by triangles, where that makes a solid much "
-        "thicker than the seam is wide. Of triangles that coincide with opposite sides one is kept. A "
+        "border vertices on them, up to 1e-5 diagonals away (T-junctions), and borders that run along each other "
+        "within a fifth of epsilon, such as those of mirrored halves, are joined by triangles, where that makes a "
+        "solid much thicker than the seam is wide. Of triangles that coincide with opposite sides one is kept. A "
         "closed surface that is given with both sides is a solid. What faces inwards and is no cavity is turned.\n\n"
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Blocks whose sides "
