@@ -12,12 +12,14 @@
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/mesh/border_weld.h"
+#include "nodes/mesh/hidden_parts.h"
 #include "nodes/mesh/hole_cgal.h"
 #include "nodes/mesh/lend_joints.h"
 #include "nodes/mesh/opposite_pairs.h"
 #include "nodes/mesh/overlaps.h"
 #include "nodes/mesh/seams.h"
 #include "nodes/mesh/triangle_cover.h"
+#include "nodes/mesh/turned_parts.h"
 #include "nodes/mesh/two_sides.h"
 #include "nodes/mesh/wrap_cgal.h"
 
@@ -43,7 +45,7 @@ static const double least_gap = 1e-9;
 /* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
  * solids covers it then. Folds that are not longer need no union for the same reason. */
 static const double flap_reach = 0.75;
-/* If the union leaves less than this share of the triangles of solids, a part may hide the others by mistake. */
+/* If the union leaves less than this share of the other solids, one may hide them by mistake. */
 static const double least_left = 0.2;
 enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 }; /* components and caps that the report lists */
 
@@ -67,11 +69,13 @@ typedef struct solidifier {
   uint32_t *plain, *pairs;        /* their corners */
   qmat_parts parts;
   double *cap_areas; /* per loop */
-  uint8_t *turned;   /* per part: it is turned inside out */
+  uint8_t *facing;   /* per part: a qmat_facing */
   triangle_list solids, sheets;
   double *beside_solids; /* the vertices in the frame of the surface of the solids */
   size_t given_count;    /* of the solids' triangles; behind these are seams and caps */
-  size_t seam_triangles, caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
+  uint32_t *solid_parts; /* their parts */
+  qmat_hidden_parts hidden;
+  size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
   double cap_length, cap_area;
   qmat_united united;
   qmat_wrap wrap;
@@ -83,10 +87,6 @@ static qmat_status fail_shortage(const solidifier *s) {
 
 static const double *position(const solidifier *s, uint32_t vertex) {
   return s->unit + 3 * (size_t)vertex;
-}
-
-static bool is_sheet(const qmat_part *part) {
-  return part->kind == QMAT_PART_OPEN || part->kind == QMAT_PART_FLAT;
 }
 
 static qmat_status append(const solidifier *s, triangle_list *list, uint32_t a, uint32_t b, uint32_t c) {
@@ -137,6 +137,11 @@ static double epsilon_of(const solidifier *s) {
   return s->params->epsilon > 0 ? s->params->epsilon : QMAT_DEFAULT_EPSILON;
 }
 
+/* Border vertices and edges this close are at one place, in diagonals. */
+static double same_place(const solidifier *s) {
+  return fmin(weld_tolerance, 0.01 * epsilon_of(s));
+}
+
 /* Of sheets, in model units. */
 static double sheet_thickness(const solidifier *s) {
   return s->params->thickness > 0 ? s->params->thickness * s->frame.diagonal : s->mesh->sheet_thickness;
@@ -148,7 +153,7 @@ static qmat_status weld_seams(solidifier *s) {
   s->triangle_count = s->mesh->triangle_count - s->mesh->sheet_triangle_count;
   if (s->mesh->closed) return QMAT_OK;
   const qmat_status status = qmat_weld_borders(s->context, s->mesh->vertex_count, s->unit, s->triangle_count,
-                                               s->triangles, fmin(weld_tolerance, 0.01 * epsilon_of(s)), &s->weld);
+                                               s->triangles, same_place(s), &s->weld);
   if (status != QMAT_OK || s->weld.merged == 0) return status;
   s->triangles = s->weld.triangles;
   s->triangle_count = s->weld.triangle_count;
@@ -157,55 +162,19 @@ static qmat_status weld_seams(solidifier *s) {
 
 /* ---- solids ---- */
 
-/* Whether the other solid parts are wound around a point: a part there that faces inwards is a cavity. */
-static bool is_within_others(const solidifier *s, const double *boxes, uint32_t part, const double *point) {
-  double winding = 0;
-  for (size_t t = 0; t < s->parts.triangle_count; t++) {
-    const uint32_t other = s->parts.part_of[t];
-    const double *box = boxes + 6 * (size_t)other;
-    if (other == part || is_sheet(&s->parts.parts[other])) continue;
-    if (point[0] < box[0] || point[1] < box[1] || point[2] < box[2] || point[0] > box[3] || point[1] > box[4] ||
-        point[2] > box[5])
-      continue;
-    const uint32_t *c = s->parts.triangles + 3 * t;
-    winding += qmat_seen_share(point, position(s, c[0]), position(s, c[1]), position(s, c[2]));
-  }
-  return fabs(winding) > 0.5;
-}
-
 static qmat_status turn_parts(solidifier *s) {
-  const qmat_parts *parts = &s->parts;
-  double *boxes = NULL;
-  s->turned = qmat_arena_calloc(&s->context->arena, parts->part_count, 1);
-  if (!s->turned) return fail_shortage(s);
-  for (uint32_t t = 0; t < parts->triangle_count; t++) {
-    const uint32_t part = parts->part_of[t];
-    const qmat_part *p = &parts->parts[part];
-    if (p->volume >= 0 || is_sheet(p) || s->turned[part]) continue;
-    if (!boxes) {
-      boxes = qmat_arena_alloc(&s->context->arena, parts->part_count, 6 * sizeof *boxes);
-      if (!boxes) return fail_shortage(s);
-      for (size_t i = 0; i < 6 * parts->part_count; i++) boxes[i] = i % 6 < 3 ? INFINITY : -INFINITY;
-      for (size_t i = 0; i < 3 * parts->triangle_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-          double *box = boxes + 6 * (size_t)parts->part_of[i / 3];
-          box[k] = fmin(box[k], position(s, parts->triangles[i])[k]);
-          box[3 + k] = fmax(box[3 + k], position(s, parts->triangles[i])[k]);
-        }
-    }
-    s->turned[part] = is_within_others(s, boxes, part, position(s, parts->triangles[3 * (size_t)t])) ? 2 : 1;
-    s->turned_parts += s->turned[part] == 1;
-    const qmat_status status = qmat_progress(s->context, t, parts->triangle_count, "triangles");
-    if (status != QMAT_OK) return status;
-  }
-  return QMAT_OK;
+  s->facing = qmat_arena_calloc(&s->context->arena, s->parts.part_count, 1);
+  if (!s->facing) return fail_shortage(s);
+  const qmat_status status = qmat_find_turned_parts(s->context, &s->parts, s->facing);
+  for (size_t i = 0; i < s->parts.part_count; i++) s->turned_parts += s->facing[i] == QMAT_FACING_TURNED;
+  return status;
 }
 
 /* Triangulates a border loop; its area is kept for the report. */
 static qmat_status add_cap(solidifier *s, size_t number) {
   const qmat_loop *loop = &s->parts.loops[number];
   const uint32_t *vertices = s->parts.loop_vertices + loop->first;
-  const bool turn = s->turned[loop->part] == 1;
+  const bool turn = s->facing[loop->part] == QMAT_FACING_TURNED;
   double *points = qmat_alloc(6 * loop->count, sizeof *points), normal[3];
   uint32_t *made = qmat_alloc(3 * (loop->count - 2), sizeof *made);
   qmat_status status = points && made ? QMAT_OK : fail_shortage(s);
@@ -243,6 +212,7 @@ static qmat_status split_folds(solidifier *s, size_t given) {
     const uint32_t *c = s->solids.corners + 3 * t;
     if (t == given) s->given_count = s->solids.count;
     if (!classes[t]) {
+      if (t < given) s->solid_parts[s->solids.count] = s->solid_parts[t];
       memmove(s->solids.corners + 3 * s->solids.count++, c, 3 * sizeof *c);
     } else if (t < given) {
       status = append(s, &s->sheets, c[0], c[1], c[2]);
@@ -258,17 +228,19 @@ static qmat_status sort_triangles(solidifier *s) {
   qmat_status status = QMAT_OK;
   size_t given = 0;
   s->cap_areas = qmat_arena_calloc(&s->context->arena, parts->loop_count, sizeof *s->cap_areas);
-  if (!s->cap_areas) return fail_shortage(s);
+  s->solid_parts = qmat_arena_alloc(&s->context->arena, parts->triangle_count, sizeof *s->solid_parts);
+  if (!s->cap_areas || !s->solid_parts) return fail_shortage(s);
   for (size_t t = 0; status == QMAT_OK && t < parts->triangle_count; t++) {
     const uint32_t *c = parts->triangles + 3 * t;
-    const bool turn = s->turned[parts->part_of[t]] == 1;
-    triangle_list *list = is_sheet(&parts->parts[parts->part_of[t]]) ? &s->sheets : &s->solids;
+    const bool turn = s->facing[parts->part_of[t]] == QMAT_FACING_TURNED;
+    triangle_list *list = qmat_part_is_sheet(&parts->parts[parts->part_of[t]]) ? &s->sheets : &s->solids;
+    if (list == &s->solids) s->solid_parts[list->count] = parts->part_of[t];
     status = append(s, list, c[0], c[turn ? 2 : 1], c[turn ? 1 : 2]);
-    if (t < s->plain_count) given = s->solids.count;
+    if (t < parts->triangle_count - parts->seam_count) given = s->solids.count;
   }
   s->given_count = given;
   for (size_t i = 0; status == QMAT_OK && i < parts->loop_count; i++) {
-    if (is_sheet(&parts->parts[parts->loops[i].part])) continue;
+    if (qmat_part_is_sheet(&parts->parts[parts->loops[i].part])) continue;
     status = add_cap(s, i);
     if (status == QMAT_OK) status = qmat_progress(s->context, i, parts->loop_count, "borders");
   }
@@ -282,7 +254,7 @@ static qmat_status sort_triangles(solidifier *s) {
 static void choose_kinds(solidifier *s) {
   for (size_t i = 0; i < s->parts.part_count; i++) {
     qmat_part *part = &s->parts.parts[i];
-    if (s->params->solid == SOLID_SHEET && !is_sheet(part))
+    if (s->params->solid == SOLID_SHEET && !qmat_part_is_sheet(part))
       part->kind = part->kind == QMAT_PART_CLOSED ? QMAT_PART_FLAT : QMAT_PART_OPEN;
     if (s->params->solid == SOLID_CLOSE && part->kind == QMAT_PART_OPEN) part->kind = QMAT_PART_HOLES;
   }
@@ -332,7 +304,8 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   for (size_t i = 0; i < 3 * s->sheets.count; i++)
     mesh->triangles[3 * triangle_count + i] = numbers[shift + s->sheets.corners[i]];
   mesh->closed = mesh->oriented = true;
-  mesh->deviation = s->mesh->deviation + (s->weld.moved + s->sides.distance) * s->frame.diagonal + s->united.moved;
+  mesh->deviation = s->mesh->deviation +
+                    (s->weld.moved + s->sides.distance + s->parts.split_distance) * s->frame.diagonal + s->united.moved;
   mesh->meters_per_unit = s->mesh->meters_per_unit;
   mesh->flap_triangle_count = s->flaps;
   if (s->sheets.count > 0) mesh->sheet_thickness = sheet_thickness(s);
@@ -474,8 +447,8 @@ static json_t *describe_part(const solidifier *s, uint32_t number) {
          *object = json_pack("{s:I,s:s,s:f}", "triangles", (json_int_t)(part->triangle_count - part->seam_triangles),
                              "taken_for", kind_names[part->kind], "area", part->area - part->seam_area);
   int bad = !caps || !object;
-  if (!bad && s->turned[number] == 1) bad |= json_object_set_new(object, "turned", json_true());
-  if (!bad && s->turned[number] == 2) bad |= json_object_set_new(object, "cavity", json_true());
+  if (!bad && s->facing[number] == QMAT_FACING_TURNED) bad |= json_object_set_new(object, "turned", json_true());
+  if (!bad && s->facing[number] == QMAT_FACING_CAVITY) bad |= json_object_set_new(object, "cavity", json_true());
   if (!bad && part->seam_triangles > 0) {
     bad |= qmat_json_set_count(object, "seam_triangles", part->seam_triangles);
     bad |= json_object_set_new(object, "seam_area", json_real(part->seam_area));
@@ -505,14 +478,22 @@ static int report_parts(const solidifier *s, json_t *root) {
   return bad | json_object_set_new(root, "components", list);
 }
 
-/* Warns where the union leaves few triangles. */
+/* Warns where the union leaves few solids, or none within a room that is seen from inside. */
 static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
-  const size_t given = s->solids.count, left = s->united.triangle_count;
-  if (!s->united.changed || (double)left >= least_left * (double)given) return 0;
+  const size_t hidden = s->hidden.parts, in_room = s->hidden.in_room;
+  size_t solids = 0;
+  for (size_t i = 0; i < s->parts.part_count; i++) solids += !qmat_part_is_sheet(&s->parts.parts[i]);
+  if (in_room > 0)
+    return qmat_json_add_warning(
+        root,
+        "a part that faces inwards, such as a room seen from inside, is taken for a full solid, and %zu solid%s inside "
+        "it %s left out; --set solid.solid=sheet keeps the walls",
+        in_room, in_room == 1 ? "" : "s", in_room == 1 ? "is" : "are");
+  if ((double)hidden <= (1 - least_left) * (double)(solids - 1) || hidden == 0) return 0;
   return qmat_json_add_warning(root,
-                               "at least %zu of %zu triangles of solids lie in or on other solids, and are left out; "
+                               "%zu of %zu solids (%zu of %zu triangles) lie in or on other solids, and are left out; "
                                "if that is not wanted, remove the part around them, such as a sky or a room",
-                               given - left, given);
+                               hidden, solids, s->hidden.triangles, s->solids.count);
 }
 
 /* Warns where caps are a large share of components, and of the model: they may be containers. */
@@ -557,7 +538,8 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"flap_triangles", s->flaps},
                                     {"parts_turned", s->turned_parts},
                                     {"triangles_turned", s->parts.turned},
-                                    {"seam_triangles", s->seam_triangles},
+                                    {"edges_split", s->parts.edges_split},
+                                    {"seam_triangles", s->parts.seam_count},
                                     {"caps", s->caps},
                                     {"cap_sides", s->cap_sides},
                                     {"triangles_folded", s->folded},
@@ -565,7 +547,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"triangles_cut", s->united.cut_triangles}};
   int bad = qmat_json_set_counts(root, counts, sizeof counts / sizeof *counts);
   if (s->caps > 0) bad |= json_object_set_new(root, "cap_length", json_real(s->cap_length));
-  if (s->caps + s->seam_triangles > 0) bad |= json_object_set_new(root, "cap_area", json_real(s->cap_area));
+  if (s->caps + s->parts.seam_count > 0) bad |= json_object_set_new(root, "cap_area", json_real(s->cap_area));
   if (s->wrap.triangles) bad |= qmat_json_set_count(root, "wrap_triangles", s->wrap.triangle_count);
   if (made) {
     bad |= qmat_json_set_count(root, "vertices", made->vertex_count);
@@ -583,6 +565,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
 /* ---- the node ---- */
 
 static qmat_status make_solid(solidifier *s) {
+  const bool joins = s->params->solid != SOLID_SHEET;
   s->unit = qmat_arena_alloc(&s->context->arena, s->mesh->vertex_count, 3 * sizeof *s->unit);
   if (!s->unit) return fail_shortage(s);
   qmat_frame_to_unit(&s->frame, s->mesh->positions, s->mesh->vertex_count, s->unit);
@@ -591,9 +574,8 @@ static qmat_status make_solid(solidifier *s) {
   if (status == QMAT_OK) status = split_pairs(s);
   if (status == QMAT_OK)
     status = qmat_parts_find_with_seams(s->context, s->mesh->vertex_count, s->unit, s->plain_count, s->plain,
-                                        s->params->solid == SOLID_SHEET ? 0 : seam_width * epsilon_of(s), &s->parts);
+                                        joins ? seam_width * epsilon_of(s) : 0, joins ? same_place(s) : 0, &s->parts);
   if (status != QMAT_OK) return status;
-  s->seam_triangles = s->parts.triangle_count - s->plain_count;
   choose_kinds(s);
   status = turn_parts(s);
   if (status == QMAT_OK) status = sort_triangles(s);
@@ -602,6 +584,9 @@ static qmat_status make_solid(solidifier *s) {
                                  s->solids.corners, flap_reach * epsilon_of(s) * s->frame.diagonal, &s->united);
   /* The last resort: without their union, the inside of what intersects is not defined. */
   if (status == QMAT_OK && s->united.why_not) status = wrap_triangles(s, s->solids.corners, s->solids.count);
+  if (status == QMAT_OK && s->united.changed)
+    status = qmat_count_hidden_parts(s->context, &s->parts, s->facing, s->given_count, s->solid_parts, s->united.fates,
+                                     &s->hidden);
   return status == QMAT_OK ? review_sheets(s) : status;
 }
 
@@ -624,6 +609,7 @@ static qmat_status run(qmat_context *context, const void *data, const qmat_value
   qmat_free(s.united.positions);
   qmat_free(s.united.triangles);
   qmat_free(s.united.is_cut);
+  qmat_free(s.united.fates);
   qmat_free(s.wrap.positions);
   qmat_free(s.wrap.triangles);
   qmat_free(s.solids.corners);
@@ -645,8 +631,8 @@ static const qmat_param params[] = {
     QMAT_LENGTH(mesh_solid_params, thickness, 0, 0, 1, "The thickness of sheets"),
     QMAT_LENGTH(
         mesh_solid_params, epsilon, 0.01, 0, 1,
-        "The epsilon of the run. A wrap lies a quarter of it outside the surface; three quarters of it are the longest "
-        "fold that stays, and how far a flap sticks out; 0: 1% is used"),
+        "The epsilon of the run. A wrap lies a quarter of it outside the surface. Folds up to three quarters of it "
+        "stay, and a sheet that sticks out by no more is a flap. 0: 1%"),
     {0},
 };
 
@@ -672,13 +658,14 @@ const qmat_node qmat_node_mesh_solid = {
         "own. Border vertices 1e-5 diagonals apart are one. A closed component is a solid. The borders of an open one "
         "are closed by caps if the generalised winding number is near 0 or 1 along most of it; else it is a sheet, a "
         "surface without volume. A warning says where caps are more than a tenth of a component's area, such as the "
-        "lid of a box. A tooth of a border that its cap folds back on is a sheet, too. Borders that run along each "
-        "other within a fifth of epsilon, such as those of mirrored halves, are joined by triangles where that makes "
-        "a solid much thicker than the seam is wide. Of triangles that coincide with opposite sides one is kept. A "
+        "lid of a box. A tooth of a border that its cap folds back on is a sheet, too. Border edges are split at "
+        "border vertices on them, up to 1e-5 diagonals away (T-junctions), and borders that run along each other "
+        "within a fifth of epsilon, such as those of mirrored halves, are joined by triangles, where that makes a "
+        "solid much thicker than the seam is wide. Of triangles that coincide with opposite sides one is kept. A "
         "closed surface that is given with both sides is a solid. What faces inwards and is no cavity is turned.\n\n"
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Blocks whose sides "
-        "touch become one; sides up to 1e-6 diagonals apart do. Cavities stay. Sheets inside a solid are left out. "
+        "touch, or are at most 1e-6 diagonals apart, become one. Cavities stay. Sheets inside a solid are left out. "
         "Disjoint solids stay as they are. Where a part crosses itself, some of its triangles, such as those of a "
         "folded cuff, may have the outside on both sides: they become sheets. A part that crosses only itself, in "
         "folds of at most three quarters of epsilon, stays as it is.\n\n"
@@ -688,7 +675,8 @@ const qmat_node qmat_node_mesh_solid = {
         "The sheets are the last triangles. A wrap is CGAL's alpha wrap, which closes gaps up to twice epsilon; what "
         "it keeps away is added to the mesh's deviation.\n\n"
         "If solids that overlap cannot be united, all solids are wrapped, with a warning. Another warning says where "
-        "solids hide most others, such as a sky around a scene.",
+        "a solid hides most others, such as a sky around a scene, or a room that is seen from inside hides any. A part "
+        "that faces inwards is a cavity where other solids are around most of it, whatever touches it from inside.",
     .citation = "Jacobson et al. 2013; Zhou et al. 2016, Mesh arrangements for solid geometry",
     .params_size = sizeof(mesh_solid_params),
     .params = params,

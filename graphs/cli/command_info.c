@@ -104,7 +104,8 @@ static void print_components(const json_t *report) {
   static const char *const counts[] = {
       "components_not_listed", "vertices_welded", "sheet_triangles",      "opposite_triangles_merged",
       "two_sided_solids",      "inner_triangles", "unbounding_triangles", "flap_triangles",
-      "triangles_turned",      "seam_triangles",  "parts_united",         "triangles_cut"};
+      "triangles_turned",      "edges_split",     "seam_triangles",       "parts_united",
+      "triangles_cut"};
   size_t i;
   json_t *part;
   json_array_foreach(json_object_get(report, "components"), i, part) {

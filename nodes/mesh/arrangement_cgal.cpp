@@ -335,6 +335,7 @@ class Cutter {
                               [](const Cut &a, const Cut &b) { return a.triangle < b.triangle; });
     };
     std::vector<Pair> members; /* a plane's leader, and a triangle in it */
+    out_.overlaps.resize(mesh_.triangle_count());
     for (const uint32_t t : triangles)
       if (!mesh_.is_flat(t)) members.emplace_back(qmat_set_leader(planes_, t), t);
     std::sort(members.begin(), members.end());
@@ -354,6 +355,7 @@ class Cutter {
         add_piece(t, {same_[c[0]], same_[c[1]], same_[c[2]]}, 1);
       } else {
         out_.cut_count += group.size();
+        for (const uint32_t member : group) out_.overlaps[member] = group.size() > 1;
         cut_plane(group, cuts);
       }
       group.clear();

@@ -14,7 +14,7 @@ namespace qmat {
 
 /* A piece of a triangle, or of several coplanar triangles that overlap there. */
 struct Piece {
-  uint32_t source; /* the first triangle that it is cut from */
+  uint32_t source; /* the triangle that it is cut from; the first of those that overlap in a plane */
   Corners corners; /* vertices of the arrangement, the smallest first */
   int layers;      /* the triangles there that face this way minus those that face the other way; not below 0 */
 };
@@ -55,6 +55,7 @@ struct Arrangement {
   std::vector<Piece> pieces;
   std::vector<Piece> cancelled; /* faces where the triangles of a plane cancel: of 0 layers */
   size_t cut_count = 0;         /* triangles that are cut, or overlap others */
+  std::vector<bool> overlaps;   /* per triangle of the mesh: others of its plane lie on it, or on those */
   std::vector<Point> points;    /* per vertex; those of mesh vertices are set only where triangles meet */
 };
 

@@ -2,11 +2,11 @@
 #include "nodes/mesh/overlaps.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "core/disjoint_sets.h"
 #include "core/geometry/half_edges.h"
 #include "core/geometry/vector.h"
+#include "nodes/mesh/box_pairs_cgal.h"
 #include "nodes/mesh/crossings_cgal.h"
 #include "nodes/mesh/square_blocks.h"
 
@@ -94,55 +94,56 @@ static void widen_boxes(patch *patches, size_t count) {
     }
 }
 
-static int compare_patches(const void *left, const void *right) {
-  const patch *a = left, *b = right;
-  const int order = (a->bounds.low[0] > b->bounds.low[0]) - (a->bounds.low[0] < b->bounds.low[0]);
-  return order != 0 ? order : (a->leader > b->leader) - (a->leader < b->leader);
+/* What joins patches whose boxes meet. */
+typedef struct near_search {
+  unison *u;
+  patch *patches;
+  uint8_t *is_near;
+} near_search;
+
+static qmat_status join_patches(void *data, uint32_t i, uint32_t k) {
+  const near_search *n = data;
+  patch *a = &n->patches[i], *b = &n->patches[k];
+  box common;
+  if (!intersect_boxes(&a->bounds, &b->bounds, &common)) return QMAT_OK;
+  grow_box(&a->reach, common.low);
+  grow_box(&a->reach, common.high);
+  grow_box(&b->reach, common.low);
+  grow_box(&b->reach, common.high);
+  qmat_sets_join(n->u->groups, a->leader, b->leader);
+  n->is_near[qmat_set_leader(n->u->shells, a->leader)] = n->is_near[qmat_set_leader(n->u->shells, b->leader)] = 1;
+  return QMAT_OK;
 }
 
 /* Finds the patches of shells whose boxes intersect, or are apart by rounding only. `reaches` (per triangle) becomes 1
  * if the triangle's box meets such an intersection, and `is_near` (zeroed, per shell by its leader) becomes 1 for their
  * shells. */
 static qmat_status find_near(unison *u, uint8_t *reaches, uint8_t *is_near) {
-  const unison *mesh = u;
   qmat_arena *arena = &u->context->arena;
-  uint32_t *numbers = qmat_arena_alloc(arena, mesh->triangle_count, sizeof *numbers);
+  uint32_t *numbers = qmat_arena_alloc(arena, u->triangle_count, sizeof *numbers);
   size_t count = 0;
-  for (uint32_t t = 0; numbers && t < mesh->triangle_count; t++)
+  for (uint32_t t = 0; numbers && t < u->triangle_count; t++)
     if (qmat_set_leader(u->patches, t) == t) numbers[t] = (uint32_t)count++;
   patch *patches = qmat_arena_alloc(arena, count, sizeof *patches);
-  if (!numbers || !patches) return fail_shortage(u->context);
-  for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+  double *bounds = qmat_arena_alloc(arena, count, 6 * sizeof *bounds);
+  if (!numbers || !patches || !bounds) return fail_shortage(u->context);
+  for (uint32_t t = 0; t < u->triangle_count; t++) {
     const uint32_t leader = qmat_set_leader(u->patches, t);
     patch *s = &patches[numbers[leader]];
     if (leader == t) *s = (patch){t, no_box, no_box};
-    for (size_t k = 0; k < 3; k++)
-      grow_box(&s->bounds, mesh->positions + 3 * (size_t)mesh->triangles[3 * (size_t)t + k]);
+    for (size_t k = 0; k < 3; k++) grow_box(&s->bounds, u->positions + 3 * (size_t)u->triangles[3 * (size_t)t + k]);
   }
   widen_boxes(patches, count);
-  qsort(patches, count, sizeof *patches, compare_patches);
-  for (size_t i = 0; i < count; i++) {
-    const qmat_status status = qmat_progress(u->context, i, count, "parts");
-    if (status != QMAT_OK) return status;
-    numbers[patches[i].leader] = (uint32_t)i;
-    for (size_t j = i + 1; j < count && patches[j].bounds.low[0] <= patches[i].bounds.high[0]; j++) {
-      box common;
-      if (!intersect_boxes(&patches[i].bounds, &patches[j].bounds, &common)) continue;
-      grow_box(&patches[i].reach, common.low);
-      grow_box(&patches[i].reach, common.high);
-      grow_box(&patches[j].reach, common.low);
-      grow_box(&patches[j].reach, common.high);
-      qmat_sets_join(u->groups, patches[i].leader, patches[j].leader);
-      is_near[qmat_set_leader(u->shells, patches[i].leader)] = is_near[qmat_set_leader(u->shells, patches[j].leader)] =
-          1;
-    }
-  }
-  for (uint32_t t = 0; t < mesh->triangle_count; t++) {
-    const box bounds = triangle_box(mesh, t);
+  for (size_t i = 0; i < 6 * count; i++)
+    bounds[i] = i % 6 < 3 ? patches[i / 6].bounds.low[i % 6] : patches[i / 6].bounds.high[i % 6 - 3];
+  near_search search = {u, patches, is_near};
+  const qmat_status status = qmat_find_box_pairs(u->context, bounds, count, NULL, 0, join_patches, &search);
+  for (uint32_t t = 0; status == QMAT_OK && t < u->triangle_count; t++) {
+    const box of_triangle = triangle_box(u, t);
     box common;
-    reaches[t] = intersect_boxes(&bounds, &patches[numbers[qmat_set_leader(u->patches, t)]].reach, &common);
+    reaches[t] = intersect_boxes(&of_triangle, &patches[numbers[qmat_set_leader(u->patches, t)]].reach, &common);
   }
-  return QMAT_OK;
+  return status;
 }
 
 qmat_status qmat_unite_overlaps(qmat_context *context, size_t vertex_count, const double *positions,

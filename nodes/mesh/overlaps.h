@@ -10,8 +10,8 @@
  * that meets only itself stays as it is if it has no walls inside and no fold longer than `longest_fold` (>= 0, in the
  * unit of the positions): every vertex that the union leaves out is so near to the border of its region, and no piece
  * of a triangle that it leaves out has a side above twice that. QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY,
- * QMAT_CANCELLED. One thread. Cost: n log n with boxes of triangles where nothing overlaps, else that of
- * qmat_unite_shells for the shells that do. */
+ * QMAT_CANCELLED. One thread. Cost: n log^2 n with boxes of patches and triangles, and a box test of each two patches
+ * whose boxes meet; then that of qmat_unite_shells for the shells that may overlap. */
 qmat_status qmat_unite_overlaps(qmat_context *context, size_t vertex_count, const double *positions,
                                 size_t triangle_count, const uint32_t *triangles, double longest_fold,
                                 qmat_united *united);

@@ -374,6 +374,18 @@ static qmat_status find_loops(division *d) {
 
 /* ---- what a part is ---- */
 
+void qmat_part_grow_box(const qmat_parts *parts, size_t part, double box[6]) {
+  const qmat_part *of = &parts->parts[part];
+  for (size_t i = 0; i < 3 * of->triangle_count; i++) {
+    const uint32_t t = parts->members[of->first_member + i / 3];
+    const double *p = parts->positions + 3 * (size_t)parts->triangles[3 * (size_t)t + i % 3];
+    for (size_t k = 0; k < 3; k++) {
+      box[k] = fmin(box[k], p[k]);
+      box[3 + k] = fmax(box[3 + k], p[k]);
+    }
+  }
+}
+
 double qmat_seen_share(const double *from, const double *a, const double *b, const double *c) {
   double p[3], q[3], r[3], product[3];
   qmat_subtract(a, from, p);
@@ -448,18 +460,25 @@ static void judge_part(const division *d, qmat_part *part, const uint32_t *trian
     part->kind = is_flat || part->filled < least_filled ? QMAT_PART_OPEN : QMAT_PART_HOLES;
 }
 
+static qmat_status list_members(const division *d) {
+  qmat_parts *parts = d->parts;
+  size_t *next = qmat_arena_alloc(&d->context->arena, parts->part_count, sizeof *next), first = 0;
+  parts->members = qmat_arena_alloc(&d->context->arena, parts->triangle_count, sizeof *parts->members);
+  if (!next || !parts->members) return fail_shortage(d);
+  for (size_t i = 0; i < parts->part_count; first += parts->parts[i++].triangle_count)
+    next[i] = parts->parts[i].first_member = first;
+  for (uint32_t t = 0; t < parts->triangle_count; t++) parts->members[next[parts->part_of[t]]++] = t;
+  return QMAT_OK;
+}
+
 static qmat_status judge_parts(division *d) {
   const qmat_parts *parts = d->parts;
-  size_t *starts = qmat_arena_calloc(&d->context->arena, parts->part_count + 1, sizeof *starts);
-  uint32_t *triangles = qmat_arena_alloc(&d->context->arena, parts->triangle_count, sizeof *triangles);
   d->samples = qmat_arena_alloc(&d->context->arena, MOST_POINTS, 3 * sizeof *d->samples);
-  if (!starts || !triangles || !d->samples) return fail_shortage(d);
-  for (size_t i = 0; i < parts->part_count; i++) starts[i + 1] = starts[i] + parts->parts[i].triangle_count;
-  for (uint32_t t = 0; t < parts->triangle_count; t++) triangles[starts[parts->part_of[t]]++] = t;
+  if (!d->samples) return fail_shortage(d);
   for (size_t i = 0; i < parts->part_count; i++) {
     const qmat_status status = qmat_progress(d->context, i, parts->part_count, "parts");
     if (status != QMAT_OK) return status;
-    judge_part(d, &parts->parts[i], triangles + starts[i] - parts->parts[i].triangle_count);
+    judge_part(d, &parts->parts[i], parts->members + parts->parts[i].first_member);
   }
   return QMAT_OK;
 }
@@ -476,6 +495,7 @@ qmat_status qmat_parts_find(qmat_context *context, size_t vertex_count, const do
   if (status == QMAT_OK) status = find_pieces(&d);
   if (status == QMAT_OK) status = settle_pieces(&d);
   if (status == QMAT_OK) status = find_parts(&d);
+  if (status == QMAT_OK) status = list_members(&d);
   if (status == QMAT_OK) status = find_border(&d);
   if (status == QMAT_OK) status = find_loops(&d);
   return status == QMAT_OK ? judge_parts(&d) : status;

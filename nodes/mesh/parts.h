@@ -22,7 +22,7 @@ typedef struct qmat_loop {
 
 typedef struct qmat_part {
   qmat_part_kind kind;
-  size_t triangle_count;
+  size_t first_member, triangle_count;
   size_t first_loop, loop_count;
   double area, volume;   /* the volume with holes closed by cones */
   double filled;         /* share of the area at which the winding number is near 0 or 1 */
@@ -42,6 +42,10 @@ typedef struct qmat_parts {
   uint32_t *part_of;   /* triangle_count */
   size_t part_count;
   qmat_part *parts;
+  uint32_t *members;     /* triangle_count: the triangles by part */
+  size_t seam_count;     /* the last triangles, which qmat_parts_find_with_seams adds */
+  size_t edges_split;    /* edges that it splits at vertices that lie on them */
+  double split_distance; /* the largest between such a vertex and its edge */
   size_t loop_count;
   qmat_loop *loops; /* by part */
   uint32_t *loop_vertices;
@@ -55,6 +59,15 @@ typedef struct qmat_parts {
  * Source: Jacobson et al. 2013, Robust inside-outside segmentation using generalized winding numbers. */
 qmat_status qmat_parts_find(qmat_context *context, size_t vertex_count, const double *positions, size_t triangle_count,
                             const uint32_t *triangles, qmat_parts *parts);
+
+/* Whether a part is taken for a surface without volume. */
+static inline bool qmat_part_is_sheet(const qmat_part *part) {
+  return part->kind == QMAT_PART_OPEN || part->kind == QMAT_PART_FLAT;
+}
+
+/* Grows a box (the least x, y, z, then the largest; INFINITY and -INFINITY where it is empty) by the corners of a part.
+ */
+void qmat_part_grow_box(const qmat_parts *parts, size_t part, double box[6]);
 
 /* The share of all directions in which the triangle abc is seen from a point, all 3 doubles; positive from its back.
  * Over a surface these sum up to its generalised winding number. Source: van Oosterom, Strackee 1983. */

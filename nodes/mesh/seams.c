@@ -7,6 +7,7 @@
 
 #include "core/geometry/half_edges.h"
 #include "core/geometry/triangle.h"
+#include "nodes/mesh/border_split.h"
 
 /* The mean thickness of a solid is at least so many times the width of its seams. */
 static const double least_thickness = 4;
@@ -31,7 +32,7 @@ typedef struct seam_triangle {
 /* What a part with seams is made of. */
 typedef struct joined_part {
   bool has_sheets;
-  double width, length;
+  double width, length; /* of its seams: the largest width, and the border that they close */
 } joined_part;
 
 typedef struct seam_finder {
@@ -39,7 +40,7 @@ typedef struct seam_finder {
   size_t vertex_count, triangle_count;
   const double *positions;
   const uint32_t *triangles;
-  double tolerance;
+  double tolerance; /* the largest width of seams */
   border_edge *border;
   size_t border_count;
   size_t *nearest; /* per border edge; SIZE_MAX: none */
@@ -184,11 +185,15 @@ static qmat_status divide_with_seams(const seam_finder *s, qmat_parts *parts) {
   return status;
 }
 
+static double open_length(const qmat_parts *parts, const qmat_part *part) {
+  double length = 0;
+  for (size_t l = part->first_loop; l < part->first_loop + part->loop_count; l++) length += parts->loops[l].length;
+  return length;
+}
+
 static bool stays(const qmat_parts *parts, const qmat_part *part, const joined_part *joined) {
-  double open = 0;
-  for (size_t l = part->first_loop; l < part->first_loop + part->loop_count; l++) open += parts->loops[l].length;
-  const bool is_solid = part->kind == QMAT_PART_CLOSED || part->kind == QMAT_PART_HOLES;
-  return is_solid && (joined->has_sheets || part->loop_count == 0) && open <= joined->length &&
+  const double open = open_length(parts, part);
+  return !qmat_part_is_sheet(part) && (joined->has_sheets || part->loop_count == 0) && open <= joined->length &&
          2 * fabs(part->volume) >= least_thickness * joined->width * part->area;
 }
 
@@ -213,25 +218,89 @@ static qmat_status drop_seams(seam_finder *s, const qmat_parts *apart, const qma
   return QMAT_OK;
 }
 
+/* ---- edges split at vertices on them ---- */
+
+/* Takes out the splits of parts that they do not improve. `apart`: the parts without splits. */
+static qmat_status drop_splits(const seam_finder *s, const qmat_split_triangles *made, const qmat_parts *apart,
+                               const qmat_parts *parts, qmat_edge_split *splits, size_t *count) {
+  joined_part *joined = qmat_arena_calloc(&s->context->arena, parts->part_count, sizeof *joined);
+  if (!joined) return fail_shortage(s);
+  for (size_t i = 0; i < apart->part_count; i++) {
+    const qmat_part *before = &apart->parts[i];
+    joined_part *j = &joined[parts->part_of[made->first[apart->members[before->first_member]]]];
+    j->has_sheets = j->has_sheets || before->kind == QMAT_PART_OPEN;
+    j->length += open_length(apart, before);
+  }
+  for (size_t i = 0; i < parts->part_count; i++) joined[i].length -= open_length(parts, &parts->parts[i]);
+  size_t kept = 0;
+  for (int pass = 0; pass < 2; pass++)
+    for (size_t i = 0; i < *count; i++) {
+      const uint32_t part = parts->part_of[made->first[splits[i].half_edge / 3]];
+      if (pass == 0)
+        joined[part].width = fmax(joined[part].width, splits[i].distance);
+      else if (stays(parts, &parts->parts[part], &joined[part]))
+        splits[kept++] = splits[i];
+    }
+  *count = kept;
+  return QMAT_OK;
+}
+
+/* Splits border edges at border vertices that lie on them. */
+static qmat_status split_borders(seam_finder *s, double tolerance, qmat_parts *parts) {
+  const qmat_parts apart = *parts;
+  qmat_edge_split *splits;
+  size_t count, before;
+  qmat_status status = qmat_find_edge_splits(s->context, s->vertex_count, s->positions, s->triangle_count, s->triangles,
+                                             tolerance, &splits, &count);
+  for (int round = 0; status == QMAT_OK && round < MOST_ROUNDS && count > 0; round++) {
+    qmat_split_triangles made;
+    before = count;
+    status = qmat_split_edges(s->context, s->triangle_count, s->triangles, splits, count, &made);
+    if (status == QMAT_OK)
+      status = qmat_parts_find(s->context, s->vertex_count, s->positions, made.count, made.triangles, parts);
+    if (status == QMAT_OK) status = drop_splits(s, &made, &apart, parts, splits, &count);
+    if (status != QMAT_OK || count < before) continue;
+    s->triangle_count = made.count;
+    s->triangles = made.triangles;
+    for (size_t i = 0; i < count; i++) {
+      parts->edges_split += i == 0 || splits[i].half_edge != splits[i - 1].half_edge;
+      parts->split_distance = fmax(parts->split_distance, splits[i].distance);
+    }
+    return QMAT_OK;
+  }
+  *parts = apart;
+  return status;
+}
+
+/* Joins border edges that run along each other. */
+static qmat_status join_seams(seam_finder *s, qmat_parts *parts) {
+  const qmat_parts apart = *parts;
+  qmat_status status = find_seams(s);
+  for (int round = 0; status == QMAT_OK && round < MOST_ROUNDS && s->seam_count > 0; round++) {
+    size_t dropped = 0;
+    status = divide_with_seams(s, parts);
+    if (status == QMAT_OK) status = drop_seams(s, &apart, parts, &dropped);
+    if (status != QMAT_OK || dropped > 0) continue;
+    parts->seam_count = s->seam_count;
+    parts->edges_split = apart.edges_split;
+    parts->split_distance = apart.split_distance;
+    return QMAT_OK;
+  }
+  *parts = apart;
+  return status;
+}
+
 qmat_status qmat_parts_find_with_seams(qmat_context *context, size_t vertex_count, const double *positions,
-                                       size_t triangle_count, const uint32_t *triangles, double tolerance,
+                                       size_t triangle_count, const uint32_t *triangles, double width, double tolerance,
                                        qmat_parts *parts) {
   seam_finder s = {.context = context,
                    .vertex_count = vertex_count,
                    .triangle_count = triangle_count,
                    .positions = positions,
                    .triangles = triangles,
-                   .tolerance = tolerance};
+                   .tolerance = width};
   qmat_status status = qmat_parts_find(context, vertex_count, positions, triangle_count, triangles, parts);
-  if (status != QMAT_OK || parts->loop_count == 0 || !(tolerance > 0)) return status;
-  const qmat_parts apart = *parts;
-  status = find_seams(&s);
-  for (int round = 0; status == QMAT_OK && round < MOST_ROUNDS && s.seam_count > 0; round++) {
-    size_t dropped = 0;
-    status = divide_with_seams(&s, parts);
-    if (status == QMAT_OK) status = drop_seams(&s, &apart, parts, &dropped);
-    if (status != QMAT_OK || dropped == 0) return status;
-  }
-  *parts = apart;
+  if (status == QMAT_OK && parts->loop_count > 0 && tolerance > 0) status = split_borders(&s, tolerance, parts);
+  if (status == QMAT_OK && parts->loop_count > 0 && width > 0) status = join_seams(&s, parts);
   return status;
 }

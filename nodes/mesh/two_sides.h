@@ -18,7 +18,8 @@ typedef struct qmat_two_sides {
  * opposite volumes. The second is the one that is given later, on the average. A component is no such solid where
  * others are wound around it: there it is a wall between a solid and what fills its cavity. `positions`: 3 *
  * vertex_count, in a unit frame; `triangles`: 3 * count. QMAT_ERROR_MEMORY, QMAT_CANCELLED. One thread. Cost: linear,
- * and a box test of each component for each that is found. */
+ * and for each component that is found a box test of each other one, and a test of each triangle of those whose shadow
+ * along a fixed direction holds a point of it. */
 qmat_status qmat_drop_second_sides(qmat_context *context, size_t vertex_count, const double *positions, size_t count,
                                    const uint32_t *triangles, qmat_two_sides *sides);
 

@@ -76,6 +76,7 @@ class Union {
   size_t active_count_ = 0;
   std::vector<uint32_t> region_of_; /* per piece: the first piece of its region */
   std::vector<bool> changed_;       /* per cluster, by its leader */
+  std::vector<qmat_fate> fates_;    /* per triangle */
 
   uint32_t cluster_of(uint32_t triangle) const {
     return qmat_set_leader(clusters_, mesh_.shell(triangle));
@@ -245,8 +246,14 @@ class Union {
     }
     leave_short_folds(kept);
     size_t count = 0;
-    for (size_t i = 0; i < pieces_.size(); i++)
-      if (kept[region_of_[i]] && changed_[cluster_of(pieces_[i].source)]) pieces_[count++] = pieces_[i];
+    fates_.resize(mesh_.triangle_count());
+    for (size_t i = 0; i < pieces_.size(); i++) {
+      const bool keeps = kept[region_of_[i]];
+      if (!changed_[cluster_of(pieces_[i].source)]) continue;
+      qmat_fate &fate = fates_[pieces_[i].source];
+      if (!arrangement_.overlaps[pieces_[i].source]) fate = std::max(fate, keeps ? QMAT_FATE_SHOWN : QMAT_FATE_HIDDEN);
+      if (keeps) pieces_[count++] = pieces_[i];
+    }
     pieces_.resize(count);
   }
 
@@ -314,7 +321,9 @@ class Union {
     std::vector<uint32_t> triangles, source(arrangement_.points.size()); /* per vertex: a triangle there */
     std::vector<bool> counted(mesh_.triangle_count());
     united->is_cut = static_cast<uint8_t *>(qmat_calloc(mesh_.triangle_count(), 1));
-    if (!united->is_cut) throw std::bad_alloc();
+    united->fates = static_cast<uint8_t *>(qmat_calloc(mesh_.triangle_count(), 1));
+    if (!united->is_cut || !united->fates) throw std::bad_alloc();
+    for (uint32_t t = 0; t < mesh_.triangle_count(); t++) united->fates[t] = is_united(t) ? fates_[t] : QMAT_FATE_SHOWN;
     size_t next = 0;
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++) {
       if (is_united(t)) {
@@ -354,6 +363,14 @@ class Union {
   }
 };
 
+void release(qmat_united *united) {
+  qmat_free(united->positions);
+  qmat_free(united->triangles);
+  qmat_free(united->is_cut);
+  qmat_free(united->fates);
+  *united = {};
+}
+
 }  // namespace
 }  // namespace qmat
 
@@ -364,8 +381,7 @@ qmat_status qmat_unite_shells(qmat_context *context, const qmat_shells *shells, 
     qmat::Union(context, *shells).make(united);
     return QMAT_OK;
   } catch (const qmat::UnionRefused &refused) {
-    qmat_free(united->is_cut);
-    *united = {};
+    qmat::release(united);
     united->why_not = refused.why;
     return QMAT_OK;
   } catch (const qmat::UnionStopped &stopped) {
@@ -377,9 +393,6 @@ qmat_status qmat_unite_shells(qmat_context *context, const qmat_shells *shells, 
   } catch (...) {
     status = qmat_fail(context, QMAT_ERROR_INTERNAL, "the union of the parts failed in an unknown way");
   }
-  qmat_free(united->positions);
-  qmat_free(united->triangles);
-  qmat_free(united->is_cut);
-  *united = {};
+  qmat::release(united);
   return status;
 }

@@ -9,6 +9,13 @@
 extern "C" {
 #endif
 
+/* What became of a triangle. */
+typedef enum qmat_fate {
+  QMAT_FATE_SHARED, /* others of its plane overlap it: what is left is not counted as its own */
+  QMAT_FATE_HIDDEN, /* all of it lies inside the union */
+  QMAT_FATE_SHOWN   /* a piece of it bounds the union */
+} qmat_fate;
+
 /* The result. */
 typedef struct qmat_united {
   bool changed;        /* false: only `why_not` is set */
@@ -17,6 +24,7 @@ typedef struct qmat_united {
   double *positions;    /* 3 * vertex_count: the used vertices of the mesh in their order, then vertices on cuts */
   uint32_t *triangles;  /* 3 * triangle_count: in the order of the triangles that they are cut from */
   uint8_t *is_cut;      /* per triangle of the mesh: whether it is cut or left out */
+  uint8_t *fates;       /* per triangle of the mesh: a qmat_fate */
   size_t shells_united; /* cut or left out */
   size_t cut_triangles; /* of the mesh */
   double moved;         /* how far blocks are moved to touch: the result may be as far from the mesh */

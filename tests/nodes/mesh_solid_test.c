@@ -68,6 +68,14 @@ static double volume_of(const qmat_mesh *mesh) {
   return six / 6;
 }
 
+static double volume_of_sheets(qmat_mesh *mesh) {
+  const size_t solid = mesh->triangle_count - mesh->sheet_triangle_count;
+  qmat_mesh sheets = *mesh;
+  sheets.triangles += 3 * solid;
+  sheets.triangle_count -= solid;
+  return volume_of(&sheets);
+}
+
 static double area_of(const qmat_mesh *mesh) {
   double area = 0;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
@@ -1332,6 +1340,121 @@ static void test_near_sheets_and_thin_shells_are_not_joined(void **state) {
   release(&r);
 }
 
+/* ---- T-junctions ---- */
+
+/* A flat side from a corner along two edges, divided into a grid. Corners are moved by up to `noise`. */
+static void add_grid(qmat_mesh *mesh, const double corner[3], const double u[3], const double v[3], int columns,
+                     int rows, double noise, random_numbers *random) {
+  const uint32_t first = (uint32_t)mesh->vertex_count, across = (uint32_t)columns + 1;
+  for (int j = 0; j <= rows; j++)
+    for (int i = 0; i <= columns; i++) {
+      double p[3];
+      for (int k = 0; k < 3; k++)
+        p[k] = corner[k] + u[k] * i / columns + v[k] * j / rows + random_between(random, -noise, noise);
+      shape_vertex(mesh, p[0], p[1], p[2]);
+    }
+  for (uint32_t j = 0; j < (uint32_t)rows; j++)
+    for (uint32_t i = 0; i < (uint32_t)columns; i++) {
+      const uint32_t a = first + j * across + i;
+      shape_quad(mesh, a, a + 1, a + across + 1, a + across);
+    }
+}
+
+/* A box of 3 x 2 x 1 whose sides have different grids, without its last sides. */
+static qmat_mesh *box_of_grids(int sides, double noise, random_numbers *random) {
+  static const double corners[6][3] = {{0, 0, 0}, {0, 0, 1}, {0, 0, 0}, {0, 2, 0}, {0, 0, 0}, {3, 0, 0}},
+                      us[6][3] = {{0, 2, 0}, {3, 0, 0}, {3, 0, 0}, {0, 0, 1}, {0, 0, 1}, {0, 2, 0}},
+                      vs[6][3] = {{3, 0, 0}, {0, 2, 0}, {0, 0, 1}, {3, 0, 0}, {0, 2, 0}, {0, 0, 1}};
+  static const int grids[6][2] = {{3, 5}, {7, 2}, {4, 1}, {3, 6}, {1, 1}, {5, 2}};
+  qmat_mesh *mesh = shape_new();
+  for (int i = 0; i < sides; i++) add_grid(mesh, corners[i], us[i], vs[i], grids[i][0], grids[i][1], noise, random);
+  return mesh;
+}
+
+/* Puts triangles, their first corners and vertices into another order. */
+static void shuffle(qmat_mesh *mesh, random_numbers *random) {
+  for (size_t i = mesh->vertex_count; i-- > 1;) {
+    const uint32_t from = (uint32_t)i, to = (uint32_t)random_index(random, i + 1);
+    double p[3];
+    memcpy(p, mesh->positions + 3 * i, sizeof p);
+    memmove(mesh->positions + 3 * i, mesh->positions + 3 * (size_t)to, sizeof p);
+    memcpy(mesh->positions + 3 * (size_t)to, p, sizeof p);
+    for (size_t k = 0; k < 3 * mesh->triangle_count; k++) {
+      uint32_t *c = &mesh->triangles[k];
+      *c = *c == from ? to : *c == to ? from : *c;
+    }
+  }
+  for (size_t i = mesh->triangle_count; i-- > 0;) {
+    uint32_t row[3], *a = mesh->triangles + 3 * i, *b = mesh->triangles + 3 * random_index(random, i + 1);
+    const size_t turn = random_index(random, 3);
+    memcpy(row, a, sizeof row);
+    memmove(a, b, sizeof row);
+    for (size_t k = 0; k < 3; k++) b[k] = row[(k + turn) % 3];
+  }
+}
+
+/* In any order and direction, also where rounding has moved vertices off the edges. */
+static void test_a_box_with_t_junctions_is_one_solid(void **state) {
+  (void)state;
+  random_numbers random = {11, 0};
+  for (int i = 0; i < 12; i++) {
+    const double noise = i % 3 == 2 ? 2e-6 : 0;
+    qmat_mesh *mesh = box_of_grids(6, noise, &random);
+    if (i % 2) shape_rotate(mesh);
+    if (i > 3) shuffle(mesh, &random);
+    result r = unite(mesh);
+    assert_int_equal(pipeline_count(r.report, "parts"), 1);
+    assert_string_equal(taken_for(&r, 0), "solid");
+    assert_int_equal(r.mesh->sheet_triangle_count, 0);
+    assert_int_equal(pipeline_count(r.report, "caps"), 0);
+    assert_int_equal(pipeline_count(r.report, "seam_triangles"), 0);
+    assert_true(pipeline_count(r.report, "edges_split") > 30);
+    assert_int_equal(euler_of(r.mesh), 2);
+    assert_near(volume_of(r.mesh), 6, noise > 0 ? 1e-4 : 1e-9);
+    assert_near(area_of(r.mesh), 22, noise > 0 ? 1e-4 : 1e-9);
+    assert_true(r.mesh->deviation < 1e-4 && (noise == 0 || r.mesh->deviation > 1e-7));
+    assert_null(json_object_get(r.report->root, "warnings"));
+    release(&r);
+  }
+}
+
+/* An open box is one part, whose hole is capped; with wider gaps, or where all is to be a sheet, nothing is split. */
+static void test_what_t_junctions_leave_open(void **state) {
+  (void)state;
+  random_numbers random = {12, 0};
+  result r = unite(box_of_grids(5, 0, &random));
+  assert_string_equal(taken_for(&r, 0), "solid with holes");
+  assert_int_equal(pipeline_count(r.report, "parts"), 1);
+  assert_int_equal(pipeline_count(r.report, "caps"), 1);
+  assert_near(volume_of(r.mesh), 6, 1e-9);
+  release(&r);
+  qmat_mesh *mesh = box_of_grids(6, 0, &random);
+  const size_t given = mesh->triangle_count;
+  r = unite_with(mesh, "solid=sheet");
+  assert_int_equal(pipeline_count(r.report, "edges_split"), 0);
+  assert_int_equal(r.mesh->sheet_triangle_count, given);
+  release(&r);
+  r = unite(box_of_grids(6, 1e-3, &random));
+  assert_int_equal(pipeline_count(r.report, "edges_split"), 0);
+  assert_int_equal(pipeline_count(r.report, "sheets"), 6);
+  release(&r);
+}
+
+/* A plane in two parts; a triangle with vertices on all its sides; a post that stands on the border of a sheet. */
+static void test_sheets_with_t_junctions_stay_as_they_are(void **state) {
+  (void)state;
+  random_numbers random = {13, 0};
+  qmat_mesh *mesh = shape_new();
+  add_grid(mesh, (const double[]){0, 0, 0}, (const double[]){1, 0, 0}, (const double[]){0, 1, 0}, 1, 1, 0, &random);
+  add_grid(mesh, (const double[]){1, 0, 0}, (const double[]){1, 0, 0}, (const double[]){0, 1, 0}, 1, 2, 0, &random);
+  add_grid(mesh, (const double[]){0.5, 0, 0}, (const double[]){0, 0.1, 0}, (const double[]){0, 0, 1}, 1, 1, 0, &random);
+  result r = unite(mesh);
+  assert_int_equal(pipeline_count(r.report, "edges_split"), 0);
+  assert_int_equal(r.mesh->sheet_triangle_count, 8);
+  assert_int_equal(r.mesh->triangle_count, 8);
+  release(&r);
+}
+
 /* A cube without a lid, whose cap is a fifth of the five sides that are given. */
 static void test_a_large_opening_that_is_closed_is_a_warning(void **state) {
   (void)state;
@@ -1375,6 +1498,67 @@ static void test_a_part_that_hides_all_others_is_a_warning(void **state) {
     }
     release(&r);
   }
+}
+
+/* A room that is seen from inside, with two boxes on its floor and one above it. `sunk`: the two stick out of the
+ * floor, and one of a wall. `inward`: as it is given; else all is turned, as reading turns a model of a negative
+ * volume. A larger box is beside it. */
+static qmat_mesh *room(bool inward, double sunk) {
+  qmat_mesh *mesh = shape_new();
+  shape_add_box(mesh, 0, 0, 0, 5, 4, 2.7, inward);
+  shape_add_box(mesh, sunk > 0 ? -sunk : 1, 1, -sunk, 2, 2, 0.8, !inward);
+  shape_add_box(mesh, 3, 0.2, -sunk, 4.8, 1, 1, !inward);
+  shape_add_box(mesh, 2.5, 2.5, 0.3, 3.5, 3.5, 1, !inward);
+  shape_add_box(mesh, 10, 0, 0, 15, 5, 5, false);
+  return mesh;
+}
+
+static void test_what_stands_on_the_floor_of_a_room(void **state) {
+  (void)state;
+  random_numbers random = {14, 0};
+  for (int i = 0; i < 24; i++) {
+    const bool inward = i % 2;
+    const double sunk = i % 3 == 2 ? 0.01 : 0;
+    qmat_mesh *mesh = room(inward, sunk);
+    if (i > 5) shuffle(mesh, &random);
+    may_move = i > 11;
+    if (i > 11) shape_rotate(mesh);
+    result r = unite(mesh);
+    const json_t *warnings = json_object_get(r.report->root, "warnings");
+    assert_int_equal(pipeline_count(r.report, "solids"), 5);
+    assert_int_equal(pipeline_count(r.report, "parts_turned"), inward);
+    assert_int_equal(json_array_size(warnings), inward);
+    if (inward) {
+      const char *text = sunk > 0 ? ", and 1 solid inside it is left out" : ", and 3 solids inside it are left out";
+      assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), text));
+      assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), "--set solid.solid=sheet "));
+    }
+    if (sunk == 0) {
+      assert_int_equal(r.mesh->sheet_triangle_count > 0, !inward); /* the floor below the boxes */
+      const double inside = inward ? 0 : 0.8 + 1.8 * 0.8 + 0.7;
+      assert_near(volume_of(r.mesh) - volume_of_sheets(r.mesh), 125 + 54 - inside, 1e-4);
+    }
+    release(&r);
+  }
+  may_move = false;
+}
+
+/* Of a box around another one, and of a cavity as wide as its solid. */
+static void test_few_solids_that_lie_in_others(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(4, 4, 4);
+  shape_add_box(mesh, 1, 1, 1, 2, 2, 2, false);
+  result r = unite(mesh);
+  const json_t *warnings = json_object_get(r.report->root, "warnings");
+  assert_int_equal(json_array_size(warnings), 1);
+  assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), "1 of 2 solids (12 of 24 triangles)"));
+  release(&r);
+  mesh = shape_box(4, 4, 4);
+  shape_add_box(mesh, 1, 1, 0, 2, 2, 2, true);
+  r = unite(mesh);
+  assert_int_equal(pipeline_count(r.report, "parts_turned"), 0);
+  assert_null(json_object_get(r.report->root, "warnings"));
+  release(&r);
 }
 
 /* A cube with a fin on an edge, a wall across its middle, or one of its sides twice. */
@@ -1543,6 +1727,11 @@ int main(void) {
       cmocka_unit_test(test_near_sheets_and_thin_shells_are_not_joined),
       cmocka_unit_test(test_a_large_opening_that_is_closed_is_a_warning),
       cmocka_unit_test(test_a_part_that_hides_all_others_is_a_warning),
+      cmocka_unit_test(test_a_box_with_t_junctions_is_one_solid),
+      cmocka_unit_test(test_what_t_junctions_leave_open),
+      cmocka_unit_test(test_sheets_with_t_junctions_stay_as_they_are),
+      cmocka_unit_test(test_what_stands_on_the_floor_of_a_room),
+      cmocka_unit_test(test_few_solids_that_lie_in_others),
       cmocka_unit_test(test_fins_are_sheets_and_walls_inside_are_left_out),
       cmocka_unit_test(test_what_faces_inwards_is_turned_unless_it_is_a_cavity),
       cmocka_unit_test(test_each_choice_does_what_it_says),
