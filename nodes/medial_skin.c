@@ -282,9 +282,14 @@ static double distance_of(const skin *s) {
 
 static qmat_status make_contour(skin *s, int detail, size_t most_cells, qmat_skin_triangles *surface,
                                 qmat_envelope_grid *grid) {
-  return qmat_envelope_surface(s->context, s->envelope, s->spheres, s->solid.sphere_count,
-                               1 / (double)s->params->resolution, detail, s->marks, s->mark_count, most_cells, surface,
-                               grid);
+  const qmat_cell_request request = {.spheres = s->spheres,
+                                     .sphere_count = s->solid.sphere_count,
+                                     .base = 1 / (double)s->params->resolution,
+                                     .detail = detail,
+                                     .marks = s->marks,
+                                     .mark_count = s->mark_count,
+                                     .most = most_cells};
+  return qmat_envelope_surface(s->context, s->envelope, &request, surface, grid);
 }
 
 /* So many points are measured between two questions whether to go on. */
