@@ -634,11 +634,11 @@ const qmat_node qmat_node_medial_skin = {
         "as prisms of three sides; those of length zero are left out. The counts and distances of the report are "
         "without them.\n\n"
         "The method skin_surface is the paper's: CGAL's skin surface, which takes balls only. Cones and slabs are "
-        "filled with balls first. It takes 3 to 15 milliseconds a ball.\n\n"
-        "The report has the largest distance from the envelope at vertices and at triangle centroids and, of a mesh "
-        "with fewer triangles than its contour, at 15 points of each triangle (error_at_samples), and that from the "
-        "vertices before edges collapse to the mesh (error_from_contour), as fractions of the diagonal of the "
-        "envelope's bounding box.",
+        "filled with balls first. It takes 3 to 15 milliseconds a ball. Its distances are bounded, too.\n\n"
+        "The report has the largest distance from the envelope at vertices and at triangle centroids. For a decimated "
+        "mesh it has that at 15 points of each triangle, too (error_at_samples), and that from the vertices before "
+        "edges collapse to the mesh (error_from_contour). All are fractions of the diagonal of the envelope's bounding "
+        "box.",
     .citation =
         "Section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "
         "Edelsbrunner 1999, Deformable smooth surface design",
