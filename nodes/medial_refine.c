@@ -355,8 +355,9 @@ static const qmat_param params[] = {
                 "vertices"),
     QMAT_INT(
         medial_refine_params, vertices, "spheres", 0, 0, 4294967294.0,
-        "With epsilon=0: the number of spheres of the final result. The initial medial mesh is refined for a quarter "
-        "divided by it, at least 0.25% and at most 1%; 0: for 0.25%, the least that medial.simplify tries"),
+        "With epsilon=0: the number of spheres of the final result. The initial medial mesh is refined for an epsilon "
+        "of 25% divided by this number, but at least 0.25% and at most 1%; 0: for 0.25%, the least that "
+        "medial.simplify tries"),
     QMAT_FLOAT(medial_refine_params, trigger, "epsilon", 0.95, 0.1, 1,
                "Refinement goes on only while some point of the surface is farther from the envelope than this"),
     QMAT_FLOAT(medial_refine_params, target, "epsilon", 0.5, 0.1, 1,

@@ -51,7 +51,7 @@ static qmat_status make_outputs(qmat_context *context, const qmat_simplify_figur
   if (status == QMAT_OK) {
     double *spheres = (*medial)->spheres;
     qmat_frame_spheres_to_model(qmat_surface_frame(surface), spheres, (*medial)->sphere_count, spheres);
-    status = qmat_skin_spheres(context, mesh, *medial);
+    status = qmat_joints_of_spheres(context, mesh, *medial);
   }
   qmat_value *const values[] = {&(*medial)->base, report ? &report->base : NULL};
   *medial = NULL;

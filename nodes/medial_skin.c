@@ -30,6 +30,11 @@ typedef struct medial_skin_params {
   double shrink, spacing, error;
 } medial_skin_params;
 
+/* Whether edges of the surface collapse, so that its error is one that was asked for. */
+static bool is_decimated(const medial_skin_params *params) {
+  return params->method == METHOD_ENVELOPE && params->error > 0;
+}
+
 typedef struct skin {
   qmat_context *context;
   const medial_skin_params *params;
@@ -255,10 +260,10 @@ static qmat_status copy_triangles(skin *s, const qmat_skin_triangles *from, qmat
 }
 
 /* Bounds both distances between the surface and the envelope; `far` gets the places beyond the error. */
-static qmat_status bound_distance(skin *s, qmat_skin_distance *far) {
+static qmat_status bound_distance(skin *s, double error, qmat_skin_distance *far) {
   qmat_medial unit = s->solid;
   unit.spheres = s->spheres;
-  const qmat_status status = qmat_skin_distance_measure(s->context, &unit, &s->surface, s->params->error, far);
+  const qmat_status status = qmat_skin_distance_measure(s->context, &unit, &s->surface, error, far);
   s->to_envelope = far->to_envelope;
   s->from_envelope = far->from_envelope;
   return status;
@@ -277,9 +282,14 @@ static double distance_of(const skin *s) {
 
 static qmat_status make_contour(skin *s, int detail, size_t most_cells, qmat_skin_triangles *surface,
                                 qmat_envelope_grid *grid) {
-  return qmat_envelope_surface(s->context, s->envelope, s->spheres, s->solid.sphere_count,
-                               1 / (double)s->params->resolution, detail, s->marks, s->mark_count, most_cells, surface,
-                               grid);
+  const qmat_cell_request request = {.spheres = s->spheres,
+                                     .sphere_count = s->solid.sphere_count,
+                                     .base = 1 / (double)s->params->resolution,
+                                     .detail = detail,
+                                     .marks = s->marks,
+                                     .mark_count = s->mark_count,
+                                     .most = most_cells};
+  return qmat_envelope_surface(s->context, s->envelope, &request, surface, grid);
 }
 
 /* So many points are measured between two questions whether to go on. */
@@ -391,7 +401,7 @@ static qmat_status decimate_copy(skin *s, const qmat_skin_triangles *contour, qm
   qmat_status status = copy_triangles(s, contour, &s->surface);
   if (status == QMAT_OK)
     status = qmat_skin_decimate(s->context, s->envelope, p->error, (size_t)p->triangles, &s->surface, &s->errors);
-  return status == QMAT_OK ? bound_distance(s, far) : status;
+  return status == QMAT_OK ? bound_distance(s, p->error, far) : status;
 }
 
 /* Makes the contour again with the finest cells at the places. */
@@ -459,6 +469,17 @@ static int add_warning(const skin *s, json_t *root) {
                                distance, 100 * s->params->error, (int)s->params->detail + 2);
 }
 
+/* Bounds the distances of a surface for which no error was asked, as sharply as for one of the largest distance found:
+ * that is in proportion to the mesh's own error. */
+static qmat_status bound_undecimated(skin *s, double largest) {
+  static const double least = 1e-6;
+  if (is_decimated(s->params) || s->surface.triangle_count == 0) return QMAT_OK;
+  qmat_skin_distance far;
+  const qmat_status status = bound_distance(s, fmax(largest, least), &far);
+  qmat_skin_distance_uninit(&far);
+  return status;
+}
+
 static qmat_status fill_report(skin *s, qmat_report *report) {
   const qmat_skin_triangles *surface = &s->surface;
   size_t components = 0;
@@ -467,14 +488,16 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
   qmat_status status = qmat_skin_topology(s->context, surface->triangles, surface->triangle_count,
                                           surface->vertex_count, &components, &euler);
   if (status == QMAT_OK) status = measure(s, &at_vertices, &at_centroids);
+  if (status == QMAT_OK) status = bound_undecimated(s, fmax(at_vertices, at_centroids));
   if (status != QMAT_OK) return status;
   json_int_t vertices = (json_int_t)surface->vertex_count, triangles = (json_int_t)surface->triangle_count;
   bool envelope = s->params->method == METHOD_ENVELOPE;
-  json_t *root = json_pack(
-      "{s:s, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:I, s:I}", "method", envelope ? "envelope" : "skin_surface",
-      "vertices", vertices, "triangles", triangles, "components", (json_int_t)components, "euler_characteristic",
-      (json_int_t)euler, "diagonal", s->frame.diagonal, "error_at_vertices", at_vertices, "error_at_centroids",
-      at_centroids, "flat_slabs", (json_int_t)s->flat.triangle_count, "flat_cones", (json_int_t)s->flat.edge_count);
+  json_t *root = json_pack("{s:s, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:f, s:I, s:I}", "method",
+                           envelope ? "envelope" : "skin_surface", "vertices", vertices, "triangles", triangles,
+                           "components", (json_int_t)components, "euler_characteristic", (json_int_t)euler, "diagonal",
+                           s->frame.diagonal, "error_at_vertices", at_vertices, "error_at_centroids", at_centroids,
+                           "mesh_to_envelope", s->to_envelope, "envelope_to_mesh", s->from_envelope, "flat_slabs",
+                           (json_int_t)s->flat.triangle_count, "flat_cones", (json_int_t)s->flat.edge_count);
   json_t *details = envelope
                         ? json_pack("{s:f, s:f, s:f, s:I, s:I, s:f, s:I}", "cell_size", s->grid.base, "cell_size_model",
                                     s->grid.base * s->frame.diagonal, "finest_cell_size", s->grid.finest, "cells",
@@ -482,11 +505,10 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
                                     (json_int_t)s->grid.refined_cell_count, "smallest_radius", s->grid.smallest_radius,
                                     "raised_radii", (json_int_t)s->grid.raised_sphere_count)
                         : json_pack("{s:I}", "balls", (json_int_t)s->ball_count);
-  if (details && envelope && s->params->error > 0) {
+  if (details && is_decimated(s->params)) {
     json_t *decimated =
-        json_pack("{s:I, s:f, s:f, s:f, s:f}", "contour_triangles", (json_int_t)s->contour_triangle_count,
-                  "error_at_samples", s->errors.to_envelope, "error_from_contour", s->errors.from_original,
-                  "mesh_to_envelope", s->to_envelope, "envelope_to_mesh", s->from_envelope);
+        json_pack("{s:I, s:f, s:f}", "contour_triangles", (json_int_t)s->contour_triangle_count, "error_at_samples",
+                  s->errors.to_envelope, "error_from_contour", s->errors.from_original);
     if (!decimated || json_object_update(details, decimated) || add_warning(s, report->root))
       status = qmat_fail_memory(s->context, "the report");
     json_decref(decimated);
@@ -547,6 +569,16 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
   return qmat_hand_over(context, status, (qmat_value *[]){(qmat_value *)mesh, (qmat_value *)report}, 2, outputs);
 }
 
+/* Without an error there is no decimation, so that a number of triangles would do nothing. */
+static qmat_status check(qmat_context *context, const void *raw_params) {
+  const medial_skin_params *p = raw_params;
+  if (p->method != METHOD_ENVELOPE || p->triangles == 0 || p->error > 0) return QMAT_OK;
+  qmat_fail(context, QMAT_ERROR_USAGE, "triangles %lld needs an error above 0: with error 0 the mesh is not decimated",
+            (long long)p->triangles);
+  qmat_fail_hint(context, "the number of triangles comes before the error, so that any error will do");
+  return qmat_fail_field(context, "triangles");
+}
+
 static const char *const methods[] = {"envelope", "skin_surface", NULL};
 
 static const qmat_param params[] = {
@@ -557,11 +589,12 @@ static const qmat_param params[] = {
     QMAT_INT(medial_skin_params, detail, "halvings", 4, 0, 6,
              "envelope: cells are halved up to this many times where medial radii are small or crevices narrow; less "
              "often where that makes more than 300,000 cells"),
-    QMAT_LENGTH(
-        medial_skin_params, error, 2e-3, 0, 0.1,
-        "envelope: the distance from the envelope that the mesh may have; 0: no decimation, and nothing is measured"),
-    QMAT_INT(medial_skin_params, triangles, "triangles", 0, 0, 100000000,
-             "envelope: at most so many, though the distance then exceeds error; 0: as many as error needs"),
+    QMAT_LENGTH(medial_skin_params, error, 2e-3, 0, 0.1,
+                "envelope: the distance from the envelope that the mesh may have; 0: no decimation"),
+    QMAT_INT(
+        medial_skin_params, triangles, "triangles", 0, 0, 100000000,
+        "envelope: at most so many, though the distance then exceeds error, which has to be above 0; 0: as many as "
+        "error needs"),
     QMAT_FLOAT(medial_skin_params, shrink, "1", 0.5, 0.05, 0.95,
                "skin_surface: near 1 the union of the balls, near 0 smoother and fuller between them"),
     QMAT_FLOAT(medial_skin_params, spacing, "radius", 0.75, 0.02, 10,
@@ -586,7 +619,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
-    .version = 18,
+    .version = 19,
     .summary = "Gives a medial mesh a surface",
     .doc =
         "The method envelope meshes the boundary of the spheres, cones and slabs by dual contouring of their exact "
@@ -598,12 +631,14 @@ const qmat_node qmat_node_medial_skin = {
         "allow. Both distances between the mesh and the envelope are bounded at the end "
         "(mesh_to_envelope, envelope_to_mesh), files state the larger, and a warning says when it exceeds `error`.\n\n"
         "Slabs of radius zero, the sheets, are added as two triangles each, one a side, and loose cones of radius zero "
-        "as prisms of three sides. The counts and distances of the report are without them.\n\n"
+        "as prisms of three sides; those of length zero are left out. The counts and distances of the report are "
+        "without them.\n\n"
         "The method skin_surface is the paper's: CGAL's skin surface, which takes balls only. Cones and slabs are "
-        "filled with balls first. It takes 3 to 15 milliseconds a ball.\n\n"
-        "The report has the largest distance from the envelope at vertices, at triangle centroids and at 15 points of "
-        "each triangle (error_at_samples), and that from the vertices before edges collapse to the mesh "
-        "(error_from_contour), as fractions of the diagonal of the envelope's bounding box.",
+        "filled with balls first. It takes 3 to 15 milliseconds a ball. Its distances are bounded, too.\n\n"
+        "The report has the largest distance from the envelope at vertices and at triangle centroids. For a decimated "
+        "mesh it has that at 15 points of each triangle, too (error_at_samples), and that from the vertices before "
+        "edges collapse to the mesh (error_from_contour). All are fractions of the diagonal of the envelope's bounding "
+        "box.",
     .citation =
         "Section 3.1.1; Ju et al. 2002, Dual contouring of Hermite data; Nielson 2004, Dual marching cubes; "
         "Edelsbrunner 1999, Deformable smooth surface design",
@@ -613,5 +648,6 @@ const qmat_node qmat_node_medial_skin = {
     .outputs = outputs,
     .libraries = libraries,
     .effort = 6,
+    .check = check,
     .run = run,
 };

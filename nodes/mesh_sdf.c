@@ -41,14 +41,13 @@ typedef struct cone_ray {
 /* Spreads rays evenly over the cone's solid angle, with the golden angle between successive rays (Vogel 1979). The
  * weight is the inverse of the angle to the axis (Shapira et al. 2008, section 3.1). */
 static void make_cone(double full_angle, size_t count, cone_ray *rays) {
-  const double golden_angle = 2.39996322972865332223;
   if (count == 1) {
     rays[0] = (cone_ray){{0, 0, 1}, 1};
     return;
   }
   const double cap = 1 - cos(0.5 * full_angle * QMAT_PI / 180);
   for (size_t i = 0; i < count; i++) {
-    const double height = 1 - cap * ((double)i + 0.5) / (double)count, turn = golden_angle * (double)i;
+    const double height = 1 - cap * ((double)i + 0.5) / (double)count, turn = QMAT_GOLDEN_ANGLE * (double)i;
     const double reach = sqrt(1 - height * height);
     rays[i] = (cone_ray){{reach * cos(turn), reach * sin(turn), height}, 1 / acos(height)};
   }

@@ -165,7 +165,7 @@ static qmat_status add_vertex_data(qmat_context *context, const scene_write_para
   if (!joints || !weights) return qmat_fail_memory(context, "the joints of a skin");
   addition->vertices.joints = joints;
   addition->vertices.weights = weights;
-  return qmat_skin_envelope(context, medial, skin, joints, weights);
+  return qmat_joints_of_envelope(context, medial, skin, joints, weights);
 }
 
 /* All inputs of one mesh, or lists of one length. `stated` has one element a medial mesh. */

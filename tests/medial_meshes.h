@@ -36,4 +36,10 @@ static inline qmat_medial *sealed_medial_mesh(const double *spheres, size_t sphe
   return medial;
 }
 
+static inline void medial_must_have(const qmat_medial *medial, size_t spheres, size_t edges, size_t triangles) {
+  assert_int_equal(medial->sphere_count, spheres);
+  assert_int_equal(medial->edge_count, edges);
+  assert_int_equal(medial->triangle_count, triangles);
+}
+
 #endif

@@ -21,6 +21,14 @@ static inline void shape_near(double actual, double expected, double tolerance, 
   _fail(file, line);
 }
 
+/* A copy of an array, to be freed with qmat_free. */
+static inline void *shape_copy(const void *array, size_t bytes) {
+  void *copy = qmat_alloc(bytes, 1);
+  assert_non_null(copy);
+  if (bytes > 0) memcpy(copy, array, bytes);
+  return copy;
+}
+
 static inline uint32_t shape_vertex(qmat_mesh *mesh, double x, double y, double z) {
   double *grown = qmat_alloc(3 * (mesh->vertex_count + 1), sizeof *grown);
   assert_non_null(grown);
@@ -72,6 +80,13 @@ static inline void shape_add_box(qmat_mesh *mesh, double x0, double y0, double z
 static inline qmat_mesh *shape_box(double x, double y, double z) {
   qmat_mesh *mesh = shape_new();
   shape_add_box(mesh, 0, 0, 0, x, y, z, false);
+  return mesh;
+}
+
+/* An axis-aligned box around the origin, from (-x, -y, -z) to (x, y, z). */
+static inline qmat_mesh *shape_box_around(double x, double y, double z) {
+  qmat_mesh *mesh = shape_new();
+  shape_add_box(mesh, -x, -y, -z, x, y, z, false);
   return mesh;
 }
 

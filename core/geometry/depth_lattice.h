@@ -15,8 +15,8 @@ typedef struct qmat_depth_lattice {
   uint64_t queries;     /* number of distance queries to the surface */
 } qmat_depth_lattice;
 
-/* Starts empty. `spacing` is in the unit frame, at least 1e-6. QMAT_ERROR_MEMORY. Free with qmat_depth_lattice_uninit,
- * also after a failure. */
+/* Starts empty. `spacing` is in the unit frame; less than 7.7e-6 is raised to about that, so that keys have room.
+ * QMAT_ERROR_MEMORY. Free with qmat_depth_lattice_uninit, also after a failure. */
 qmat_status qmat_depth_lattice_init(qmat_context *context, qmat_depth_lattice *lattice, const qmat_surface *surface,
                                     double spacing);
 void qmat_depth_lattice_uninit(qmat_depth_lattice *lattice);

@@ -19,7 +19,7 @@ typedef struct qmat_envelope qmat_envelope;
  * radius >= 0), `edges` 2 * edge_count ids and `triangles` 3 * triangle_count ids, in any order; an array of count 0
  * may be NULL. The sides of triangles may be among the edges or not. The arguments are copied. An envelope without
  * primitives is allowed. On failure `*envelope` is NULL: QMAT_ERROR_MEMORY, or QMAT_ERROR_GEOMETRY for an id out of
- * range. Cost: O(n log n) on one thread, about 450 bytes per triangle. */
+ * range. Cost: O(n log n) on one thread, about 550 bytes per triangle. */
 qmat_status qmat_envelope_new(qmat_context *context, const double *spheres, size_t sphere_count, const uint32_t *edges,
                               size_t edge_count, const uint32_t *triangles, size_t triangle_count,
                               qmat_envelope **envelope);

@@ -222,7 +222,7 @@ static qmat_status sum_up(qmat_context *context, const surface_points *s, qmat_m
   return status;
 }
 
-qmat_status qmat_skin_spheres(qmat_context *context, const qmat_mesh *mesh, qmat_medial *medial) {
+qmat_status qmat_joints_of_spheres(qmat_context *context, const qmat_mesh *mesh, qmat_medial *medial) {
   if (mesh->skinned_count == 0 || mesh->triangle_count == 0 || medial->sphere_count == 0) return QMAT_OK;
   surface_points points;
   qmat_status status = place_points(context, mesh, &points);
@@ -252,8 +252,8 @@ static void blend_joints(const qmat_envelope *envelope, const qmat_medial *media
   qmat_strongest_joints(joints, weights, count, strongest, strengths);
 }
 
-qmat_status qmat_skin_envelope(qmat_context *context, const qmat_medial *medial, const qmat_mesh *mesh,
-                               uint32_t *joints, double *weights) {
+qmat_status qmat_joints_of_envelope(qmat_context *context, const qmat_medial *medial, const qmat_mesh *mesh,
+                                    uint32_t *joints, double *weights) {
   enum { SLICE = 16384 }; /* vertices between two calls of the progress function */
   qmat_envelope *envelope;
   qmat_status status = qmat_envelope_of_medial(context, medial, &envelope);

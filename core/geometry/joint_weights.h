@@ -28,14 +28,14 @@ void qmat_strongest_joints(const uint32_t *joints, const double *weights, size_t
  * Triangles are divided, so that points are a fiftieth of the diagonal apart, but at most 16 on a side.
  * QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY for a medial mesh with ids out of range, QMAT_CANCELLED. Threads are the
  * context's; the result does not depend on them. Cost: a query of the envelope for each point. */
-qmat_status qmat_skin_spheres(qmat_context *context, const struct qmat_mesh *mesh, struct qmat_medial *medial);
+qmat_status qmat_joints_of_spheres(qmat_context *context, const struct qmat_mesh *mesh, struct qmat_medial *medial);
 
 /* Gives each vertex of an envelope's mesh the joints and weights of the spheres nearest to it: `joints` and `weights`
  * get 4 for each. The spheres of the primitive nearest to a vertex count by their weights at its foot, which vary
  * evenly along cones and slabs. QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY, QMAT_CANCELLED. Threads are the context's; the
  * result does not depend on them. Cost: a query of the envelope for each vertex. */
-qmat_status qmat_skin_envelope(qmat_context *context, const struct qmat_medial *medial, const struct qmat_mesh *mesh,
-                               uint32_t *joints, double *weights);
+qmat_status qmat_joints_of_envelope(qmat_context *context, const struct qmat_medial *medial,
+                                    const struct qmat_mesh *mesh, uint32_t *joints, double *weights);
 
 #ifdef __cplusplus
 }

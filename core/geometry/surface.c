@@ -201,16 +201,12 @@ static bool inside_by_rays(const qmat_surface *surface, const double point[3]) {
   return score > 0;
 }
 
-/* The solid angle of a triangle as seen from a point, over 4 pi (van Oosterom and Strackee 1983). */
+/* The solid angle of a triangle as seen from a point, over 4 pi. */
 static double solid_angle(const qmat_surface *surface, uint32_t triangle, const double point[3]) {
-  double a[3], b[3], c[3], bc[3];
-  qmat_subtract(corner_position(surface, triangle, 0), point, a);
-  qmat_subtract(corner_position(surface, triangle, 1), point, b);
-  qmat_subtract(corner_position(surface, triangle, 2), point, c);
-  qmat_cross(b, c, bc);
-  const double la = sqrt(qmat_dot(a, a)), lb = sqrt(qmat_dot(b, b)), lc = sqrt(qmat_dot(c, c));
-  const double y = qmat_dot(a, bc), x = la * lb * lc + qmat_dot(a, b) * lc + qmat_dot(b, c) * la + qmat_dot(c, a) * lb;
-  return y == 0 ? 0 : atan2(y, x) * 0.159154943091895335769; /* 2 / (4 pi) */
+  double y, x;
+  qmat_triangle_half_angle(corner_position(surface, triangle, 0), corner_position(surface, triangle, 1),
+                           corner_position(surface, triangle, 2), point, &y, &x);
+  return y == 0 ? 0 : atan2(y, x) * (1 / (2 * QMAT_PI));
 }
 
 static void leaf_range(const qmat_surface *surface, size_t leaf, size_t *begin, size_t *end) {

@@ -81,9 +81,9 @@ bool qmat_surface_is_watertight(const qmat_surface *surface);
 
 /* An upper bound of the radius less the depth over a simplex of `count` (1 to 3) spheres (4 doubles each), whose centre
  * is known to be inside the solid or a thick sheet: at least `lowest`, and exact up to that beside flat or convex
- * surface and in a thick sheet at one of its triangles. INFINITY where it is above `limit`, not below every radius, or
- * hard to find. `*failed` is a hint: set it to UINT32_MAX first and pass it to the calls for simplices near by. It
- * changes the time, not the answer. */
+ * surface and in a thick sheet at one of its triangles. INFINITY where it is above `limit` or hard to find and,
+ * outside thick sheets, where it is not below every radius. `*failed` is a hint: set it to UINT32_MAX first and pass it
+ * to the calls for simplices near by. It changes the time, not the answer. */
 double qmat_surface_excess_bound(const qmat_surface *surface, const double *const spheres[], int count, double lowest,
                                  double limit, uint32_t *failed);
 

@@ -42,7 +42,7 @@ static inline double qmat_closest_on_segment(const double point[3], const double
   qmat_subtract(b, a, ab);
   qmat_subtract(point, a, ap);
   const double square = qmat_dot(ab, ab);
-  return square > 0 ? fmin(fmax(qmat_dot(ap, ab) / square, 0), 1) : 0;
+  return square > 0 ? qmat_smaller(qmat_larger(qmat_dot(ap, ab) / square, 0), 1) : 0;
 }
 
 /* Six times the volume of the tetrahedron between a triangle abc and a point `from` (3 doubles each): above 0 where the
@@ -55,6 +55,20 @@ static inline double qmat_triangle_six_volumes(const double a[3], const double b
   qmat_subtract(c, from, r);
   qmat_cross(q, r, product);
   return qmat_dot(p, product);
+}
+
+/* atan2(*y, *x) is half the solid angle of a triangle abc as seen from a point `from` (3 doubles each): above 0 from
+ * the triangle's back, below 0 from its front. `*y` is 0 in its plane. Source: van Oosterom, Strackee 1983. */
+static inline void qmat_triangle_half_angle(const double a[3], const double b[3], const double c[3],
+                                            const double from[3], double *y, double *x) {
+  double p[3], q[3], r[3], product[3];
+  qmat_subtract(a, from, p);
+  qmat_subtract(b, from, q);
+  qmat_subtract(c, from, r);
+  qmat_cross(q, r, product);
+  const double lp = sqrt(qmat_dot(p, p)), lq = sqrt(qmat_dot(q, q)), lr = sqrt(qmat_dot(r, r));
+  *y = qmat_dot(p, product);
+  *x = lp * lq * lr + qmat_dot(p, q) * lr + qmat_dot(q, r) * lp + qmat_dot(r, p) * lq;
 }
 
 /* The longest side of a triangle, from corner `base` to the next, and the height over it. */

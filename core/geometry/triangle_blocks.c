@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 
 enum { LANES = 8, GROUP = 8 };
@@ -58,12 +59,8 @@ static bool find_normal(const double *const corners[3], double normal[3], double
 /* --- one triangle ----------------------------------------------------------------------------------------------- */
 
 static void closest_on_segment(const double a[3], const double b[3], const double point[3], double closest[3]) {
-  double ab[3], ap[3];
-  qmat_subtract(b, a, ab);
-  qmat_subtract(point, a, ap);
-  const double length = qmat_dot(ab, ab);
-  const double t = length > 0 ? qmat_smaller(qmat_larger(qmat_dot(ap, ab) / length, 0), 1) : 0;
-  for (int i = 0; i < 3; i++) closest[i] = t == 1 ? b[i] : a[i] + t * ab[i];
+  const double t = qmat_closest_on_segment(point, a, b);
+  for (int i = 0; i < 3; i++) closest[i] = t == 1 ? b[i] : a[i] + t * (b[i] - a[i]);
 }
 
 /* A squared distance that exceeds another by this factor is larger in spite of rounding. */

@@ -8,6 +8,8 @@
 /* Vectors and points are 3 doubles. Every function evaluates in a fixed order, so results are the same everywhere. */
 
 #define QMAT_PI 3.14159265358979323846
+/* pi (3 - sqrt 5): turns of it spread evenly around a circle. */
+#define QMAT_GOLDEN_ANGLE 2.39996322972865332
 
 /* The distance between two points, or between the centres of two spheres. */
 static inline double qmat_point_distance(const double *a, const double *b) {
@@ -49,8 +51,7 @@ static inline void qmat_normalize(double v[3]) {
 /* Direction i of n that are spread evenly over the sphere, of length 1: a spiral with the golden angle between
  * successive directions (Vogel 1979). */
 static inline void qmat_spread_direction(size_t i, size_t n, double out[3]) {
-  static const double golden_angle = 2.39996322972865332; /* pi (3 - sqrt 5) */
-  const double z = 1 - (2 * (double)i + 1) / (double)n, r = sqrt(1 - z * z), turn = golden_angle * (double)i;
+  const double z = 1 - (2 * (double)i + 1) / (double)n, r = sqrt(1 - z * z), turn = QMAT_GOLDEN_ANGLE * (double)i;
   out[0] = r * cos(turn);
   out[1] = r * sin(turn);
   out[2] = z;

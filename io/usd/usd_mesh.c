@@ -108,8 +108,8 @@ static qmat_status read_skin(const qmat_usd_prim *prim, qmat_usd_mesh *mesh) {
     influences = (size_t)size->integers[0];
   if (influences == 0 || influences > MOST_INFLUENCES || joints->count % influences != 0 ||
       joints->count / influences != (is_rigid ? 1 : points)) {
-    return qmat_usd_warn(prim, "its joints are left out: %zu of them are no %zu for each of %zu points", joints->count,
-                         influences, is_rigid ? (size_t)1 : points);
+    return qmat_usd_warn(prim, "its joints are left out: %zu values do not make %zu for each of %zu points",
+                         joints->count, influences, is_rigid ? (size_t)1 : points);
   }
   mesh->joints = joints;
   mesh->weights = weights;

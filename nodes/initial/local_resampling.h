@@ -3,8 +3,8 @@
 #define QMAT_NODES_INITIAL_LOCAL_RESAMPLING_H
 
 #include "core/geometry/frame.h"
+#include "core/geometry/point_grid.h"
 #include "core/value.h"
-#include "nodes/measure/point_grid.h"
 
 /* Where a surface needs more samples, and how dense. Lengths are in the unit frame. */
 typedef struct qmat_resampling {

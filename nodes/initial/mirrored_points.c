@@ -4,10 +4,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/point_grid.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "core/geometry/vertex_facets.h"
-#include "nodes/measure/point_grid.h"
 
 /* Walls are thin, and gaps narrow, up to these shares of the distance between samples. */
 static const double wall_share = 0.25, gap_share = 0.5;

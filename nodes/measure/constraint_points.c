@@ -8,11 +8,11 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/medial_distance.h"
+#include "core/geometry/point_grid.h"
 #include "core/geometry/sheets.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "nodes/measure/interior_points.h"
-#include "nodes/measure/point_grid.h"
 
 enum { FINEST_GRID = 256 };
 

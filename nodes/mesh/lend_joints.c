@@ -3,8 +3,8 @@
 
 #include <string.h>
 
+#include "core/geometry/point_grid.h"
 #include "core/node.h"
-#include "nodes/measure/point_grid.h"
 
 qmat_status qmat_lend_joints(qmat_context *context, const qmat_mesh *given, qmat_mesh *mesh) {
   if (given->skinned_count == 0) return QMAT_OK;

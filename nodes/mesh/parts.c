@@ -387,14 +387,9 @@ void qmat_part_grow_box(const qmat_parts *parts, size_t part, double box[6]) {
 }
 
 double qmat_seen_share(const double *from, const double *a, const double *b, const double *c) {
-  double p[3], q[3], r[3], product[3];
-  qmat_subtract(a, from, p);
-  qmat_subtract(b, from, q);
-  qmat_subtract(c, from, r);
-  qmat_cross(q, r, product);
-  const double x = sqrt(qmat_dot(p, p)), y = sqrt(qmat_dot(q, q)), z = sqrt(qmat_dot(r, r));
-  return atan2(qmat_dot(p, product), x * y * z + qmat_dot(p, q) * z + qmat_dot(q, r) * x + qmat_dot(r, p) * y) /
-         6.283185307179586477;
+  double y, x;
+  qmat_triangle_half_angle(a, b, c, from, &y, &x);
+  return atan2(y, x) / (2 * QMAT_PI);
 }
 
 static void loop_centre(const division *d, const qmat_loop *loop, double centre[3]) {

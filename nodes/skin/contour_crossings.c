@@ -62,7 +62,7 @@ static qmat_status assign_crossings(qmat_contour *c) {
     }
     c->owned_edges[i] = (uint16_t)owned;
   }
-  if (broken) return qmat_fail(c->context, QMAT_ERROR_INTERNAL, "A crossing of the envelope's surface lies in no cell");
+  if (broken) return qmat_fail(c->context, QMAT_ERROR_INTERNAL, "a crossing of the envelope's surface lies in no cell");
   size_t total = 0;
   for (size_t i = 0; i < count; i++) {
     c->first_crossing[i] = total;
@@ -248,6 +248,6 @@ qmat_status qmat_contour_find_partners(qmat_contour *c) {
   for (size_t i = 0; i < c->crossing_count; i++) {
     for (int j = 0; j < c->crossings[i].count; j++) broken = !find_partner(c, i, j) || broken;
   }
-  if (broken) return qmat_fail(c->context, QMAT_ERROR_INTERNAL, "A trace of the envelope's surface has no end");
+  if (broken) return qmat_fail(c->context, QMAT_ERROR_INTERNAL, "a trace of the envelope's surface has no end");
   return QMAT_OK;
 }

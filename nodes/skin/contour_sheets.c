@@ -32,7 +32,7 @@ qmat_status qmat_contour_find_sheets(qmat_contour *c) {
       qmat_crossing *x = &c->crossings[i];
       int slot = j, leave = j; /* cell j lies between faces j - 1 and j */
       while (x->vertices[slot] == QMAT_NO_ID) {
-        if (filled == slots) return qmat_fail(c->context, QMAT_ERROR_INTERNAL, "A sheet of the surface does not close");
+        if (filled == slots) return qmat_fail(c->context, QMAT_ERROR_INTERNAL, "a sheet of the surface does not close");
         x->vertices[slot] = (uint32_t)c->sheet_count;
         c->items[filled++] = (uint32_t)(x - c->crossings);
         uint32_t partner = x->partners[leave];
@@ -44,7 +44,7 @@ qmat_status qmat_contour_find_sheets(qmat_contour *c) {
         } else {
           slot = leave = face + 1 == x->count ? 0 : face + 1;
           if (x->cells[slot] != cell)
-            return qmat_fail(c->context, QMAT_ERROR_INTERNAL, "A sheet of the surface leaves its cell");
+            return qmat_fail(c->context, QMAT_ERROR_INTERNAL, "a sheet of the surface leaves its cell");
         }
       }
       c->sheet_items[++c->sheet_count] = filled;

@@ -375,11 +375,12 @@ static qmat_status halve(qmat_context *context, qmat_cells *cells, size_t *cell_
   return QMAT_OK;
 }
 
-qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const double *spheres, double base,
-                            int detail, double floor, const qmat_cell_mark *marks, size_t mark_count, size_t most,
-                            qmat_cells *cells) {
-  *cells = (qmat_cells){.finest = ldexp(base, -detail), .base = (uint32_t)1 << detail, .most = most};
-  qmat_status status = prepare_primitives(context, envelope, spheres, floor, &cells->primitives);
+qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const qmat_cell_request *request,
+                            double floor, qmat_cells *cells) {
+  const double base = request->base;
+  *cells = (qmat_cells){
+      .finest = ldexp(base, -request->detail), .base = (uint32_t)1 << request->detail, .most = request->most};
+  qmat_status status = prepare_primitives(context, envelope, request->spheres, floor, &cells->primitives);
   if (status != QMAT_OK) return status;
   const qmat_cell_primitives *p = &cells->primitives;
   size_t count = p->slab_count + p->cone_count + p->sphere_count;
@@ -412,7 +413,7 @@ qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope
   for (int k = 0; k < 3; k++) cells->origin[k] = 0.5 * (low[k] + high[k]) - (0.5 * size + shift[k]) * cells->finest;
   if (size * cells->finest < extent + 3 * base) return too_many(context);
 
-  status = mark(context, cells, size, marks, mark_count);
+  status = mark(context, cells, size, request->marks, request->mark_count);
   if (status != QMAT_OK) return status;
   uint32_t *all = qmat_alloc(count, sizeof *all);
   chunks = qmat_calloc(MOST_CHUNKS, sizeof *chunks);

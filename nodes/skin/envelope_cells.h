@@ -58,14 +58,22 @@ typedef struct qmat_cell_mark {
   int level; /* above 0 */
 } qmat_cell_mark;
 
-/* Finds the cells. `spheres` (4 * sphere count doubles) are those that `envelope` was made of. `base` is the largest
- * size of a cell, halved up to `detail` times where radii are small and at the marks; `floor` is the least radius. The
- * search stops where there will be more than `most` cells. Free with qmat_cells_uninit, also after a failure.
+/* What cells are wanted; the arrays are the caller's. */
+typedef struct qmat_cell_request {
+  const double *spheres; /* 4 * sphere_count: those that the envelope was made of, in a frame of about unit size */
+  size_t sphere_count;
+  double base;                 /* the largest size of a cell */
+  int detail;                  /* cells are halved up to this many times where radii are small, and at the marks */
+  const qmat_cell_mark *marks; /* NULL for none */
+  size_t mark_count;
+  size_t most; /* the search stops where there will be more cells */
+} qmat_cell_request;
+
+/* Finds the cells. Radii below `floor` are raised to it. Free with qmat_cells_uninit, also after a failure.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED; QMAT_ERROR_GEOMETRY when there are too many cells for the memory. The same cells
  * in the same order for any number of threads. Cost: linear in the cells, times the primitives that meet in one. */
-qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const double *spheres, double base,
-                            int detail, double floor, const qmat_cell_mark *marks, size_t mark_count, size_t most,
-                            qmat_cells *cells);
+qmat_status qmat_cells_find(qmat_context *context, const qmat_envelope *envelope, const qmat_cell_request *request,
+                            double floor, qmat_cells *cells);
 void qmat_cells_uninit(qmat_cells *cells);
 
 /* F with raised radii, at a point of the cell. Where F is positive: a positive number that is at least F. */

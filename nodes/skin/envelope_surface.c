@@ -28,17 +28,16 @@ static void contour_uninit(qmat_contour *c) {
   qmat_free(c->positions);
 }
 
-qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *envelope, const double *spheres,
-                                  size_t sphere_count, double base, int detail, const qmat_cell_mark *marks,
-                                  size_t mark_count, size_t most_cells, qmat_skin_triangles *surface,
+qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *envelope,
+                                  const qmat_cell_request *request, qmat_skin_triangles *surface,
                                   qmat_envelope_grid *grid) {
   *surface = (qmat_skin_triangles){0};
   qmat_contour c = {.context = context, .threads = qmat_threads(context)};
-  *grid = (qmat_envelope_grid){.base = base, .finest = ldexp(base, -detail)};
+  *grid = (qmat_envelope_grid){.base = request->base, .finest = ldexp(request->base, -request->detail)};
   grid->smallest_radius = RADIUS_FLOOR * grid->finest;
-  for (size_t i = 0; i < sphere_count; i++) grid->raised_sphere_count += spheres[4 * i + 3] < grid->smallest_radius;
-  qmat_status status = qmat_cells_find(context, envelope, spheres, base, detail, grid->smallest_radius, marks,
-                                       mark_count, most_cells, &c.cells);
+  for (size_t i = 0; i < request->sphere_count; i++)
+    grid->raised_sphere_count += request->spheres[4 * i + 3] < grid->smallest_radius;
+  qmat_status status = qmat_cells_find(context, envelope, request, grid->smallest_radius, &c.cells);
   grid->is_too_fine = c.cells.is_incomplete;
   if (grid->is_too_fine) {
     contour_uninit(&c);

@@ -21,18 +21,16 @@ typedef struct qmat_envelope_grid {
  * polygon. Cells may have several sheets (as in the dual marching cubes of Nielson 2004, here for neighbours of any
  * size), so that the surface is always a closed, oriented 2-manifold.
  *
- * `spheres` are those that `envelope` was made of, in a frame of about unit size. Cells are `base` wide, and halved up
- * to `detail` times where radii are small and at the marks. Radii below 0.9 of the finest cell are raised to that, so
- * that every primitive gives a connected surface; single spheres of radius 0 are left out.
+ * `request` says how fine the cells are. Radii below 0.9 of the finest cell are raised to that, so that every primitive
+ * gives a connected surface; single spheres of radius 0 are left out.
  *
- * There is no surface where it crosses more than `most_cells` cells; a cell has about 1.3 triangles.
+ * There is no surface where it crosses more cells than `request` allows; a cell has about 1.3 triangles.
  *
  * `surface` gets new arrays that the caller frees, also after a failure, when they may be NULL. QMAT_ERROR_MEMORY,
  * QMAT_CANCELLED; QMAT_ERROR_GEOMETRY when there is no primitive or there are too many cells. Uses all threads; the
  * same bytes for any number of them. */
-qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *envelope, const double *spheres,
-                                  size_t sphere_count, double base, int detail, const qmat_cell_mark *marks,
-                                  size_t mark_count, size_t most_cells, qmat_skin_triangles *surface,
+qmat_status qmat_envelope_surface(qmat_context *context, const qmat_envelope *envelope,
+                                  const qmat_cell_request *request, qmat_skin_triangles *surface,
                                   qmat_envelope_grid *grid);
 
 #endif

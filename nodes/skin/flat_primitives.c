@@ -14,6 +14,12 @@ static bool is_flat(const qmat_medial *medial, const uint32_t *row, size_t size)
   return true;
 }
 
+/* Whether a cone has a length; two spheres may be in one place. */
+static bool has_length(const qmat_medial *medial, const uint32_t *row) {
+  const double *a = &medial->spheres[4 * (size_t)row[0]], *b = &medial->spheres[4 * (size_t)row[1]];
+  return a[0] != b[0] || a[1] != b[1] || a[2] != b[2];
+}
+
 /* The slabs that an edge is a side of. */
 enum { FLAT_SLAB = 1, SOLID_SLAB = 2 };
 
@@ -41,7 +47,7 @@ qmat_status qmat_flat_primitives_separate(qmat_context *context, const qmat_medi
   for (size_t e = 0; e < medial->edge_count; e++) {
     const uint32_t *row = &medial->edges[2 * e];
     const bool is_line = is_flat(medial, row, 2) && !(slabs[e] & SOLID_SLAB);
-    if (is_line && slabs[e]) continue;
+    if (is_line && (slabs[e] || !has_length(medial, row))) continue;
     memcpy(&parts[is_line]->edges[2 * parts[is_line]->edge_count++], row, 2 * sizeof *row);
   }
   return QMAT_OK;
@@ -55,13 +61,24 @@ static void put_slab(const double *spheres, const uint32_t *row, uint32_t first,
   for (size_t i = 0; i < 6; i++) triangles[i] = first + sides[i];
 }
 
+/* A multiple of the axis whose square neither vanishes nor overflows. Spheres that are in two places in the model may
+ * be in one place of the frame: every axis is theirs. */
+static void find_axis(const double *ends[2], double axis[3]) {
+  qmat_subtract(ends[1], ends[0], axis);
+  const double largest = fmax(fmax(fabs(axis[0]), fabs(axis[1])), fabs(axis[2]));
+  int exponent;
+  frexp(largest, &exponent);
+  for (int k = 0; k < 3; k++) axis[k] = ldexp(axis[k], -exponent);
+  if (!(largest > 0)) axis[0] = 1;
+}
+
 /* A prism around a cone: 6 vertices and 8 triangles. */
 static void put_prism(const double *spheres, const uint32_t *row, double radius, uint32_t first, double *positions,
                       uint32_t *triangles) {
   static const uint32_t faces[24] = {0, 2, 1, 3, 4, 5, 0, 1, 4, 0, 4, 3, 1, 2, 5, 1, 5, 4, 2, 0, 3, 2, 3, 5};
   const double *ends[2] = {&spheres[4 * (size_t)row[0]], &spheres[4 * (size_t)row[1]]};
   double axis[3], u[3], v[3], unit[3] = {0, 0, 0};
-  qmat_subtract(ends[1], ends[0], axis);
+  find_axis(ends, axis);
   int least = 0;
   for (int k = 1; k < 3; k++)
     if (fabs(axis[k]) < fabs(axis[least])) least = k;

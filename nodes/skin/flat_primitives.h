@@ -9,8 +9,8 @@
 /* Slabs and cones of radius zero: sheets that enclose nothing. */
 
 /* Divides the slabs and cones of `medial`: `solid` gets those that have a positive radius, and all sides of its slabs;
- * `flat` gets the others, of which cones only where no slab has them. Both borrow the spheres of `medial`; their rows
- * are in the context's arena. QMAT_ERROR_MEMORY. Linear but for finding edges. */
+ * `flat` gets the others, of which cones only where no slab has them and they have a length. Both borrow the spheres of
+ * `medial`; their rows are in the context's arena. QMAT_ERROR_MEMORY. Linear but for finding edges. */
 qmat_status qmat_flat_primitives_separate(qmat_context *context, const qmat_medial *medial, qmat_medial *solid,
                                           qmat_medial *flat);
 

@@ -7,15 +7,9 @@
 #include <string.h>
 
 #include "core/value.h"
+#include "tests/shapes.h"
 
-static inline void *copy_of(const void *array, size_t bytes) {
-  void *copy = qmat_alloc(bytes, 1);
-  assert_non_null(copy);
-  if (bytes > 0) memcpy(copy, array, bytes);
-  return copy;
-}
-
-#define ASSIGN(field, ...) ((field) = copy_of((__VA_ARGS__), sizeof(__VA_ARGS__)))
+#define ASSIGN(field, ...) ((field) = shape_copy((__VA_ARGS__), sizeof(__VA_ARGS__)))
 
 static inline qmat_scene *scene_example(void) {
   qmat_scene *scene = qmat_scene_new();
@@ -147,8 +141,8 @@ static inline qmat_file *file_example(void) {
   file->format = qmat_strdup("gltf");
   file->part_count = 3;
   file->parts = qmat_calloc(3, sizeof *file->parts);
-  file->parts[0] = (qmat_file_part){qmat_strdup(""), 5, copy_of("{...}", 5)};
-  file->parts[1] = (qmat_file_part){qmat_strdup("medial.bin"), 3, copy_of("\0\1\2", 3)};
+  file->parts[0] = (qmat_file_part){qmat_strdup(""), 5, shape_copy("{...}", 5)};
+  file->parts[1] = (qmat_file_part){qmat_strdup("medial.bin"), 3, shape_copy("\0\1\2", 3)};
   file->parts[2] = (qmat_file_part){qmat_strdup("empty.bin"), 0, NULL};
   return file;
 }
@@ -238,8 +232,8 @@ static inline qmat_scene *whole_scene_example(void) {
   scene->part_count = 2;
   scene->parts = qmat_calloc(2, sizeof *scene->parts);
   assert_non_null(scene->parts);
-  scene->parts[0] = (qmat_file_part){qmat_strdup(""), 5, copy_of("{...}", 5)};
-  scene->parts[1] = (qmat_file_part){qmat_strdup("a/b.png"), 3, copy_of("\0\1\2", 3)};
+  scene->parts[0] = (qmat_file_part){qmat_strdup(""), 5, shape_copy("{...}", 5)};
+  scene->parts[1] = (qmat_file_part){qmat_strdup("a/b.png"), 3, shape_copy("\0\1\2", 3)};
   scene->mesh_count = 2;
   qmat_free(scene->meshes);
   ASSIGN(scene->meshes, (uint32_t[]){0, 5});

@@ -1006,7 +1006,7 @@ static void test_a_list_has_items_of_one_type(void **state) {
   assert_non_null(strstr(context.error.message, "an item of the list is missing"));
   assert_null(value);
   for (size_t cut = 0; cut < size; cut++) {
-    uint8_t *part = copy_of(bytes, cut); /* to the byte, so that reading beyond is noticed */
+    uint8_t *part = shape_copy(bytes, cut); /* to the byte, so that reading beyond is noticed */
     assert_int_equal(qmat_value_deserialize(&context, part, cut, &known_items, &value), QMAT_ERROR_FORMAT);
     qmat_free(part);
   }

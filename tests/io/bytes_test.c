@@ -6,6 +6,7 @@
 #include "io/scanner.h"
 #include "tests/io/files.h"
 #include "tests/locale.h"
+#include "tests/random.h"
 
 /* ---- whole files ---- */
 
@@ -94,15 +95,6 @@ static void test_taking_past_the_end_gives_zero_and_stays_failed(void **state) {
 }
 
 /* ---- building a file ---- */
-
-static double random_double(uint64_t index) {
-  for (uint64_t k = 0;; k++) {
-    uint64_t bits = qmat_hash3(7, index, k);
-    double number;
-    memcpy(&number, &bits, sizeof number);
-    if (isfinite(number)) return number;
-  }
-}
 
 static void assert_put(double number, const char *expected) {
   qmat_writer writer = {0};

@@ -3,6 +3,7 @@
 
 #include "tests/io/files.h"
 #include "tests/locale.h"
+#include "tests/random.h"
 
 static void assert_scans(const char *text, double expected, size_t length) {
   double number = 12345;
@@ -65,15 +66,6 @@ static void test_numbers_are_read_exactly(void **state) {
   static const char not_a_number[] = "nan";
   assert_ptr_equal(qmat_scan_double(not_a_number, not_a_number + 3, &number), not_a_number + 3);
   assert_true(isnan(number));
-}
-
-static double random_double(uint64_t index) {
-  for (uint64_t k = 0;; k++) {
-    uint64_t bits = qmat_hash3(7, index, k);
-    double number;
-    memcpy(&number, &bits, sizeof number);
-    if (isfinite(number)) return number;
-  }
 }
 
 static void test_any_double_written_in_any_length_reads_as_strtod_reads_it(void **state) {

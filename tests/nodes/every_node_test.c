@@ -64,13 +64,6 @@ typedef struct fixture {
 
 static fixture made;
 
-static void *copy_of(const void *array, size_t bytes) {
-  void *copy = qmat_alloc(bytes, 1);
-  assert_non_null(copy);
-  if (bytes > 0) memcpy(copy, array, bytes);
-  return copy;
-}
-
 static void seal(qmat_value *value) {
   qmat_context context = {0};
   const qmat_status status = qmat_value_seal(&context, value);
@@ -172,9 +165,9 @@ static qmat_value *chain_of(const qmat_medial *medial) {
   chain->sphere_count = medial->sphere_count;
   chain->edge_count = medial->edge_count;
   chain->triangle_count = medial->triangle_count;
-  chain->spheres = copy_of(medial->spheres, 4 * medial->sphere_count * sizeof(double));
-  chain->edges = copy_of(medial->edges, 2 * medial->edge_count * sizeof(uint32_t));
-  chain->triangles = copy_of(medial->triangles, 3 * medial->triangle_count * sizeof(uint32_t));
+  chain->spheres = shape_copy(medial->spheres, 4 * medial->sphere_count * sizeof(double));
+  chain->edges = shape_copy(medial->edges, 2 * medial->edge_count * sizeof(uint32_t));
+  chain->triangles = shape_copy(medial->triangles, 3 * medial->triangle_count * sizeof(uint32_t));
   return &chain->base;
 }
 
@@ -246,8 +239,8 @@ static void make_by_hand(world to, const double *positions, size_t vertex_count,
   qmat_mesh *mesh = qmat_mesh_new();
   mesh->vertex_count = vertex_count;
   mesh->triangle_count = triangle_count;
-  mesh->positions = copy_of(positions, 3 * vertex_count * sizeof *positions);
-  mesh->triangles = copy_of(triangles, 3 * triangle_count * sizeof *triangles);
+  mesh->positions = shape_copy(positions, 3 * vertex_count * sizeof *positions);
+  mesh->triangles = shape_copy(triangles, 3 * triangle_count * sizeof *triangles);
   mesh->closed = mesh->oriented = closed;
   values[QMAT_MESH] = &mesh->base;
   qmat_field *field = qmat_field_new();
@@ -259,7 +252,7 @@ static void make_by_hand(world to, const double *positions, size_t vertex_count,
   values[QMAT_FIELD] = &field->base;
   qmat_samples *samples = qmat_samples_new();
   samples->count = samples->vertex_count = vertex_count;
-  samples->positions = copy_of(positions, 3 * vertex_count * sizeof *positions);
+  samples->positions = shape_copy(positions, 3 * vertex_count * sizeof *positions);
   samples->facets = qmat_calloc(vertex_count, sizeof *samples->facets);
   samples->barycentrics = qmat_calloc(3 * vertex_count, sizeof *samples->barycentrics);
   for (size_t i = 0; i < vertex_count; i++) {
@@ -847,7 +840,7 @@ static void test_inputs_and_parameters_are_left_as_they_were(void **state) {
   for (size_t i = 0; i < qmat_node_count; i++) {
     subject run = subject_of(qmat_nodes[i]);
     const size_t count = qmat_input_count(run.node);
-    void *params = copy_of(run.params, run.node->params_size);
+    void *params = shape_copy(run.params, run.node->params_size);
     unsigned references[MOST_PORTS];
     for (size_t port = 0; port < count; port++) references[port] = run.inputs[port]->references;
     qmat_context context = {.threads = 2};
@@ -1032,22 +1025,22 @@ static void test_numbers_that_are_not_finite_cannot_be_sealed(void **state) {
     qmat_value *values[4];
     qmat_mesh *mesh = qmat_mesh_new();
     mesh->vertex_count = 2;
-    mesh->positions = copy_of((double[]){0, 0, 0, 0, bad[k], 0}, 6 * sizeof(double));
+    mesh->positions = shape_copy((double[]){0, 0, 0, 0, bad[k], 0}, 6 * sizeof(double));
     values[0] = &mesh->base;
     qmat_field *field = qmat_field_new();
     field->count = 2;
     field->unit = qmat_strdup("1");
-    field->values = copy_of((double[]){0, bad[k]}, 2 * sizeof(double));
+    field->values = shape_copy((double[]){0, bad[k]}, 2 * sizeof(double));
     values[1] = &field->base;
     qmat_samples *samples = qmat_samples_new();
     samples->count = 2;
-    samples->positions = copy_of((double[]){0, 0, 0, 0, 0, bad[k]}, 6 * sizeof(double));
+    samples->positions = shape_copy((double[]){0, 0, 0, 0, 0, bad[k]}, 6 * sizeof(double));
     samples->facets = qmat_calloc(2, sizeof *samples->facets);
-    samples->barycentrics = copy_of((double[]){1, 0, 0, 1, 0, 0}, 6 * sizeof(double));
+    samples->barycentrics = shape_copy((double[]){1, 0, 0, 1, 0, 0}, 6 * sizeof(double));
     values[2] = &samples->base;
     qmat_medial *medial = qmat_medial_new();
     medial->sphere_count = 2;
-    medial->spheres = copy_of((double[]){0, 0, 0, 1, 0, 0, 0, bad[k]}, 8 * sizeof(double));
+    medial->spheres = shape_copy((double[]){0, 0, 0, 1, 0, 0, 0, bad[k]}, 8 * sizeof(double));
     values[3] = &medial->base;
     for (size_t i = 0; i < 4; i++) {
       assert_int_equal(qmat_value_seal(&context, values[i]), QMAT_ERROR_GEOMETRY);

@@ -17,12 +17,6 @@
 
 static const double pi = 3.14159265358979323846;
 
-static qmat_mesh *box_around(double x, double y, double z) {
-  qmat_mesh *mesh = shape_new();
-  shape_add_box(mesh, -x, -y, -z, x, y, z, false);
-  return mesh;
-}
-
 /* The volume of the hull of a shape, by its triangles, which must be convex and closed. */
 static double hull_volume(const qmat_colliders *c, size_t shape) {
   const size_t first = shape > 0 ? c->hull_ends[2 * shape - 1] : 0, last = c->hull_ends[2 * shape + 1];
@@ -49,7 +43,7 @@ static void test_two_joined_spheres_are_one_capsule(void **state) {
   (void)state;
   static const double spheres[] = {-1, 0, 0, 0.5, 1, 0, 0, 0.25};
   static const uint32_t edge[] = {0, 1};
-  collider_run r = make_colliders(box_around(2, 1, 1), sealed_medial_mesh(spheres, 2, edge, 1, NULL, 0),
+  collider_run r = make_colliders(shape_box_around(2, 1, 1), sealed_medial_mesh(spheres, 2, edge, 1, NULL, 0),
                                   "hull_points=1024 hull_error=0.0002", 0);
   assert_int_equal(r.colliders->shape_count, 1);
   assert_int_equal(r.colliders->sphere_count, 2);
@@ -80,7 +74,7 @@ static void test_a_ball_that_leaves_a_cube_protrudes_by_hand(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1.2};
   collider_run r =
-      make_colliders(box_around(1, 1, 1), sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "samples=100000", 0);
+      make_colliders(shape_box_around(1, 1, 1), sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "samples=100000", 0);
   /* Six caps of height 0.2, each of area 2 pi 1.2 0.2, of which no point is farther out than 0.2. */
   assert_near(pipeline_number(r.report, "protrusion"), 6 * 0.2 / (2 * 1.2), 0.01);
   assert_near(pipeline_number(r.report, "protrusion_mean"), 0.5 * 0.1 / sqrt(12), 0.001);
@@ -96,7 +90,7 @@ static void test_mass_properties_of_a_box_by_hand(void **state) {
   (void)state;
   static const double ball[] = {10, 20, 30, 0.5}, units[] = {0, 1, 0.01}; /* a model without a unit is in metres */
   for (size_t i = 0; i < 3; i++) {
-    qmat_mesh *box = box_around(1, 2, 3);
+    qmat_mesh *box = shape_box_around(1, 2, 3);
     shape_map(box, 1, 10, 20, 30);
     box->meters_per_unit = units[i];
     collider_run r = make_colliders(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=2.5", 0);
@@ -112,7 +106,7 @@ static void test_mass_properties_of_a_box_by_hand(void **state) {
 static void test_sheets_have_no_mass(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 0.5};
-  qmat_mesh *box = box_around(1, 2, 3);
+  qmat_mesh *box = shape_box_around(1, 2, 3);
   shape_triangle(box, 0, 1, shape_vertex(box, 5, 6, 7));
   box->sheet_triangle_count = 1;
   box->closed = box->oriented = true;
@@ -126,7 +120,7 @@ static void test_sheets_have_no_mass(void **state) {
 static void test_inertia_turns_with_the_solid(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 0.5};
-  qmat_mesh *box = box_around(1, 2, 3);
+  qmat_mesh *box = shape_box_around(1, 2, 3);
   shape_rotate(box);
   collider_run r = make_colliders(box, sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0), "density=1", 0);
   const double *i = &r.colliders->body[4], m = 48 / 12.0;
@@ -147,8 +141,8 @@ static void test_nested_and_degenerate_shapes_are_left_out(void **state) {
   /* Sphere 1 is inside sphere 0, with which it is joined; sphere 2 has no radius; sphere 3 is inside the capsule. */
   static const double nested[] = {0, 0, 0, 1, 0.3, 0, 0, 0.2, 4, 0, 0, 0, 2, 0, 0, 0.1};
   static const uint32_t edges[] = {0, 1, 0, 2};
-  collider_run r =
-      make_colliders(box_around(5, 1, 1), sealed_medial_mesh(nested, 4, edges, 2, NULL, 0), "least_radius=0.001", 0);
+  collider_run r = make_colliders(shape_box_around(5, 1, 1), sealed_medial_mesh(nested, 4, edges, 2, NULL, 0),
+                                  "least_radius=0.001", 0);
   assert_int_equal(r.colliders->shape_count, 1);
   assert_int_equal(r.colliders->sphere_count, 2);
   assert_near(r.colliders->spheres[7], 0.001 * sqrt(108), 1e-12);
@@ -156,13 +150,13 @@ static void test_nested_and_degenerate_shapes_are_left_out(void **state) {
   /* A slab whose large sphere reaches beyond the line of the others is two capsules and no hull. */
   static const double steep[] = {0, 0, 0, 1, 1.2, 0.1, 0, 0.1, 1.2, -0.1, 0, 0.1};
   static const uint32_t slab[] = {0, 1, 2};
-  r = make_colliders(box_around(3, 3, 3), sealed_medial_mesh(steep, 3, NULL, 0, slab, 1), "", 0);
+  r = make_colliders(shape_box_around(3, 3, 3), sealed_medial_mesh(steep, 3, NULL, 0, slab, 1), "", 0);
   assert_int_equal(pipeline_count(r.report, "hulls_of_three") + pipeline_count(r.report, "capsules"),
                    r.colliders->shape_count);
   collider_run_free(&r);
   /* Two equal spheres are one. */
   static const double equal[] = {0, 0, 0, 1, 0, 0, 0, 1};
-  r = make_colliders(box_around(1, 1, 1), sealed_medial_mesh(equal, 2, NULL, 0, NULL, 0), "", 0);
+  r = make_colliders(shape_box_around(1, 1, 1), sealed_medial_mesh(equal, 2, NULL, 0, NULL, 0), "", 0);
   assert_int_equal(r.colliders->shape_count, 1);
   collider_run_free(&r);
 }
@@ -332,8 +326,9 @@ static bool is_in_hull(const qmat_colliders *c, size_t shape, const double point
 /* A ball around a box leaves only the box in its hull, as exactly as the planes of facets can. */
 static void test_the_hull_of_a_ball_around_a_box_is_the_box(void **state) {
   (void)state;
-  collider_run r = make_colliders(box_around(1, 2, 3), sealed_medial_mesh((double[]){0, 0, 0, 4}, 1, NULL, 0, NULL, 0),
-                                  "fit=contain kind=hulls", 0);
+  collider_run r =
+      make_colliders(shape_box_around(1, 2, 3), sealed_medial_mesh((double[]){0, 0, 0, 4}, 1, NULL, 0, NULL, 0),
+                     "fit=contain kind=hulls", 0);
   assert_true(json_is_true(json_object_get(r.report->root, "proved")));
   assert_int_equal(r.colliders->shape_count, 1);
   assert_int_equal(qmat_shape_width(r.colliders->shapes), 3);
@@ -349,7 +344,7 @@ static void test_the_hull_of_a_ball_around_a_box_is_the_box(void **state) {
 static void test_hulls_are_joined_where_the_solid_is_convex(void **state) {
   (void)state;
   const double spheres[8] = {0, 0, 1.5, 3, 0, 0, -1.5, 3};
-  collider_run r = make_colliders(box_around(1, 2, 3), sealed_medial_mesh(spheres, 2, NULL, 0, NULL, 0),
+  collider_run r = make_colliders(shape_box_around(1, 2, 3), sealed_medial_mesh(spheres, 2, NULL, 0, NULL, 0),
                                   "fit=contain kind=hulls", 0);
   assert_int_equal(pipeline_count(r.report, "single_spheres"), 2);
   assert_int_equal(pipeline_count(r.report, "shapes"), 1);
@@ -358,7 +353,7 @@ static void test_hulls_are_joined_where_the_solid_is_convex(void **state) {
   assert_true(hull_volume(r.colliders, 0) > 48);
   collider_run_free(&r);
   for (size_t most = 0; most < 3; most++) {
-    qmat_mesh *mesh = box_around(1, 1, 1);
+    qmat_mesh *mesh = shape_box_around(1, 1, 1);
     shape_add_box(mesh, 3, -1, -1, 5, 1, 1, false);
     char params[64];
     snprintf(params, sizeof params, "fit=contain kind=hulls shapes=%zu", most);
@@ -387,7 +382,7 @@ static void test_a_sheet_beside_a_box_has_a_hull_of_its_own(void **state) {
   const double spheres[20] = {0, 0, 0, 2, 3, -1, -1, 0, 3, 1, -1, 0, 3, -1, 1, 0, 3, 1, 1, 0};
   const uint32_t triangles[6] = {1, 2, 4, 1, 3, 4}, edges[10] = {1, 2, 1, 3, 1, 4, 2, 4, 3, 4};
   for (int thick = 0; thick < 2; thick++) {
-    qmat_mesh *mesh = box_around(1, 1, 1);
+    qmat_mesh *mesh = shape_box_around(1, 1, 1);
     shape_add_sheet(mesh, 2, 3, place_wall);
     mesh->closed = mesh->oriented = true;
     mesh->sheet_thickness = thick ? 0.2 : 0;
@@ -425,7 +420,7 @@ static void test_contain_leaves_no_point_of_a_thick_sheet_outside(void **state) 
   const uint32_t triangles[6] = {1, 2, 4, 1, 3, 4}, edges[10] = {1, 2, 1, 3, 1, 4, 2, 4, 3, 4};
   for (int kind = 0; kind < 3; kind++) {
     char params[64];
-    qmat_mesh *mesh = box_around(1, 1, 1);
+    qmat_mesh *mesh = shape_box_around(1, 1, 1);
     shape_add_sheet(mesh, 8, 8, place_sail);
     mesh->closed = mesh->oriented = true;
     mesh->sheet_thickness = 2 * half;
@@ -478,7 +473,7 @@ static void test_the_gap_of_a_thick_sheet_is_that_of_its_sides(void **state) {
 /* A needle of a sheet, without area, has a hull, too. */
 static void test_a_sheet_without_area_has_a_hull(void **state) {
   (void)state;
-  qmat_mesh *mesh = box_around(1, 1, 1);
+  qmat_mesh *mesh = shape_box_around(1, 1, 1);
   const uint32_t ends[2] = {shape_vertex(mesh, 2, 0, 0), shape_vertex(mesh, 3, 0, 0)};
   shape_triangle(mesh, ends[0], ends[1], shape_vertex(mesh, 2.5, 0, 0));
   mesh->sheet_triangle_count = 1;

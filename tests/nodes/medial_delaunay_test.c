@@ -11,16 +11,14 @@
 
 #include "core/geometry/surface.h"
 #include "core/geometry/triangle.h"
+#include "core/geometry/vector.h"
 #include "nodes/measure/topology.h"
+#include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
 
 /* The spheres of the tetrahedra, without merging, halving or thinning. */
 #define PLAIN "merge=0 max_envelope_error=0 thinning_tolerance=0"
-
-static double distance(const double *a, const double *b) {
-  return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
 
 static qmat_field *constant_thickness(const qmat_mesh *mesh, double value) {
   qmat_context context = {0};
@@ -69,12 +67,6 @@ static void assert_sphere(const qmat_medial *medial, size_t i, double x, double 
   assert_near(s[3], r, 1e-12);
 }
 
-static void assert_counts(const qmat_medial *medial, size_t spheres, size_t edges, size_t triangles) {
-  assert_int_equal(medial->sphere_count, spheres);
-  assert_int_equal(medial->edge_count, edges);
-  assert_int_equal(medial->triangle_count, triangles);
-}
-
 static void assert_region(const qmat_medial *medial, size_t sphere, const uint32_t *samples, size_t count) {
   const uint32_t first = medial->region_offsets[sphere];
   assert_int_equal(medial->region_offsets[sphere + 1] - first, count);
@@ -97,7 +89,7 @@ static void test_regular_tetrahedron(void **state) {
   pipeline p;
   sample_vertices(&p, mesh);
   pipeline_delaunay(&p, 0, "");
-  assert_counts(p.medial, 1, 0, 0);
+  medial_must_have(p.medial, 1, 0, 0);
   assert_sphere(p.medial, 0, 0, 0, 0, 1 / sqrt(3));
   assert_region(p.medial, 0, (uint32_t[]){0, 1, 2, 3}, 4);
   assert_int_equal(pipeline_count(p.report, "tetrahedra"), 1);
@@ -105,7 +97,7 @@ static void test_regular_tetrahedron(void **state) {
   assert_int_equal(pipeline_count(p.report, "incentres"), 0);
   assert_int_equal(pipeline_count(p.report, "components"), 1);
   pipeline_delaunay(&p, 0, "radius=circumradius");
-  assert_counts(p.medial, 1, 0, 0);
+  medial_must_have(p.medial, 1, 0, 0);
   assert_sphere(p.medial, 0, 0, 0, 0, sqrt(3));
   pipeline_free(&p);
 }
@@ -120,7 +112,7 @@ static void test_coincident_centres_of_a_cube_become_one(void **state) {
     pipeline p;
     sample_vertices(&p, mesh);
     pipeline_delaunay(&p, 0, "merge=1e-6");
-    assert_counts(p.medial, 1, 0, 0);
+    medial_must_have(p.medial, 1, 0, 0);
     assert_sphere(p.medial, 0, 0, 0, 0, 1);
     assert_region(p.medial, 0, (uint32_t[]){0, 1, 2, 3, 4, 5, 6, 7}, 8);
     assert_true(pipeline_count(p.report, "circumcentres") >= 5);
@@ -153,7 +145,7 @@ static void test_facet_between_two_tetrahedra_gives_an_edge(void **state) {
   pipeline_delaunay(&p, 0, "max_envelope_error=0");
   const double radius = 0.625 / sqrt(4.25);
   const int up = p.medial->spheres[2] > 0 ? 0 : 1;
-  assert_counts(p.medial, 2, 1, 0);
+  medial_must_have(p.medial, 2, 1, 0);
   assert_sphere(p.medial, (size_t)up, 0, 0, 0.75, radius);
   assert_sphere(p.medial, (size_t)!up, 0, 0, -0.75, radius);
   assert_region(p.medial, (size_t)up, (uint32_t[]){0, 1, 2, 3}, 4);
@@ -172,7 +164,7 @@ static void test_ring_around_an_edge_gives_a_slab(void **state) {
   static const char *const settings[] = {"", "incentres=thin theta=1"};
   for (int i = 0; i < 2; i++) {
     pipeline_delaunay(&p, 0, settings[i]);
-    assert_counts(p.medial, 3, 3, 1);
+    medial_must_have(p.medial, 3, 3, 1);
     assert_int_equal(pipeline_count(p.report, "circumcentres"), 0);
     assert_int_equal(pipeline_count(p.report, "incentres"), 3);
     qmat_context context = {0};
@@ -205,12 +197,12 @@ static void test_sphere_gives_its_centre(void **state) {
   sample_vertices(&p, pipeline_model("sphere", 16));
   pipeline_delaunay(&p, 0, PLAIN " radius=circumradius");
   for (size_t i = 0; i < p.medial->sphere_count; i++) {
-    assert_near(distance(&p.medial->spheres[4 * i], (const double[3]){0, 0, 0}), 0, 1e-6);
+    assert_near(qmat_point_distance(&p.medial->spheres[4 * i], (const double[3]){0, 0, 0}), 0, 1e-6);
     assert_near(p.medial->spheres[4 * i + 3], 1, 1e-6);
   }
   pipeline_delaunay(&p, 0, "");
-  assert_counts(p.medial, 1, 0, 0); /* all of them merge */
-  assert_near(distance(p.medial->spheres, (const double[3]){0, 0, 0}), 0, 1e-6);
+  medial_must_have(p.medial, 1, 0, 0); /* all of them merge */
+  assert_near(qmat_point_distance(p.medial->spheres, (const double[3]){0, 0, 0}), 0, 1e-6);
   assert_int_equal(p.medial->region_sample_count, p.mesh->vertex_count);
   pipeline_free(&p);
 }
@@ -226,7 +218,7 @@ static void test_capsule_gives_its_axis(void **state) {
   for (size_t i = 0; i < p.medial->sphere_count; i++) {
     const double *s = &p.medial->spheres[4 * i];
     const double end[3] = {fmin(fmax(s[0], 0), 3), 0, 0};
-    near += distance(s, end) < 0.05 && fabs(s[3] - 1) < 0.05;
+    near += qmat_point_distance(s, end) < 0.05 && fabs(s[3] - 1) < 0.05;
   }
   assert_true((double)near > 0.75 * (double)p.medial->sphere_count);
   assert_int_equal(pipeline_components(p.medial), 1);
@@ -439,9 +431,10 @@ static size_t check_circumspheres(qmat_mesh *mesh, const char *sampling) {
     const double *s = &p.medial->spheres[4 * i];
     assert_true(p.medial->region_offsets[i + 1] >= p.medial->region_offsets[i] + 4);
     for (uint32_t r = p.medial->region_offsets[i]; r < p.medial->region_offsets[i + 1]; r++)
-      assert_near(distance(s, &p.samples->positions[3 * (size_t)p.medial->region_samples[r]]), s[3], tolerance);
+      assert_near(qmat_point_distance(s, &p.samples->positions[3 * (size_t)p.medial->region_samples[r]]), s[3],
+                  tolerance);
     for (size_t k = 0; k < p.samples->count; k++)
-      assert_true(distance(s, &p.samples->positions[3 * k]) >= s[3] - tolerance);
+      assert_true(qmat_point_distance(s, &p.samples->positions[3 * k]) >= s[3] - tolerance);
   }
   pipeline_free(&p);
   return count;
@@ -550,7 +543,7 @@ static void test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller(
   assert_int_equal(p.medial->triangle_count, by_distance->triangle_count);
   size_t larger = 0;
   for (size_t i = 0; i < p.medial->sphere_count; i++) {
-    assert_near(distance(&p.medial->spheres[4 * i], &by_distance->spheres[4 * i]), 0, 0);
+    assert_near(qmat_point_distance(&p.medial->spheres[4 * i], &by_distance->spheres[4 * i]), 0, 0);
     assert_true(p.medial->spheres[4 * i + 3] >= by_distance->spheres[4 * i + 3] - 1e-9);
     larger += p.medial->spheres[4 * i + 3] > by_distance->spheres[4 * i + 3] * (1 + 1e-6);
   }
@@ -652,7 +645,7 @@ static void test_order_of_samples_does_not_move_the_spheres(void **state) {
   sample_vertices(&q, mesh);
   pipeline_delaunay(&p, 0, PLAIN);
   pipeline_delaunay(&q, 0, PLAIN);
-  assert_counts(q.medial, p.medial->sphere_count, p.medial->edge_count, p.medial->triangle_count);
+  medial_must_have(q.medial, p.medial->sphere_count, p.medial->edge_count, p.medial->triangle_count);
   const size_t count = p.medial->sphere_count;
   double *a = calloc(count, 4 * sizeof *a), *b = calloc(count, 4 * sizeof *b);
   assert_true(a && b);

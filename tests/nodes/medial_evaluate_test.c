@@ -67,19 +67,12 @@ static void check_bounds(const subject *s, const qmat_report *report, const char
     fail_msg("%s: %.9f is not within [%.9f, %.9f]", name, expected, lo, hi);
 }
 
-/* An axis-aligned box around the origin. */
-static qmat_mesh *box_around(double x, double y, double z) {
-  qmat_mesh *mesh = shape_new();
-  shape_add_box(mesh, -x, -y, -z, x, y, z, false);
-  return mesh;
-}
-
 /* ---- by hand ---- */
 
 static void test_a_ball_in_a_cube_by_hand(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
-  subject s = subject_of(box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
+  subject s = subject_of(shape_box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "samples=20000", 0);
   check_bounds(&s, report, "surface_to_envelope", sqrt(3) - 1, 0.05);
   /* Under a corner of the cube the ball is the farthest from all sides. */
@@ -111,7 +104,7 @@ static void test_a_ball_in_a_cube_by_hand(void **state) {
 static void test_a_ball_that_leaves_a_cube_by_hand(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1.2};
-  subject s = subject_of(box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
+  subject s = subject_of(shape_box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "tolerance=0.01 epsilon=5%", 0);
   check_bounds(&s, report, "surface_to_envelope", sqrt(3) - 1.2, 0.01);
   check_bounds(&s, report, "envelope_to_surface", 1 - 1.2 / sqrt(3), 0.01);
@@ -126,7 +119,7 @@ static void test_cones_and_slabs_by_hand(void **state) {
   static const double spheres[] = {-1, 0, 0, 0.5, 1, 0, 0, 0.5, 0, 1.5, 0, 0.5};
   static const uint32_t edge[] = {0, 1}, slab[] = {0, 1, 2};
   /* A capsule as long as the box and half as wide: farthest from the surface on the middle lines of its mantle... */
-  subject s = subject_of(box_around(1.5, 1, 1), medial_mesh(spheres, 2, edge, 1, NULL, 0));
+  subject s = subject_of(shape_box_around(1.5, 1, 1), medial_mesh(spheres, 2, edge, 1, NULL, 0));
   qmat_report *report = evaluate(&s, "", 0);
   check_bounds(&s, report, "surface_to_envelope", sqrt(0.25 + 2) - 0.5, 0.05);
   check_bounds(&s, report, "envelope_to_surface", 1 - 0.5 / sqrt(2), 0.05);
@@ -134,7 +127,7 @@ static void test_cones_and_slabs_by_hand(void **state) {
   subject_free(&s);
   /* ... and a slab in a wide plate, whose sheets are 0.5 from its sides and whose mantles are 1 where they are level.
    */
-  s = subject_of(box_around(9, 9, 1), medial_mesh(spheres, 3, NULL, 0, slab, 1));
+  s = subject_of(shape_box_around(9, 9, 1), medial_mesh(spheres, 3, NULL, 0, slab, 1));
   report = evaluate(&s, "", 0);
   check_bounds(&s, report, "surface_to_envelope", sqrt(64 + 81 + 1) - 0.5, 0.05);
   check_bounds(&s, report, "envelope_to_surface", 1, 0.05);
@@ -147,7 +140,7 @@ static void test_a_sheet_alone_makes_the_boundary_where_it_is_wide(void **state)
   /* A slab of three balls that swells out of a thin plate: its sheets are parallel to the plate, out by 0.3. */
   static const double spheres[] = {-3, -2, 0, 0.8, 3, -2, 0, 0.8, 0, 3, 0, 0.8};
   static const uint32_t slab[] = {0, 1, 2};
-  subject s = subject_of(box_around(9, 9, 0.5), medial_mesh(spheres, 3, NULL, 0, slab, 1));
+  subject s = subject_of(shape_box_around(9, 9, 0.5), medial_mesh(spheres, 3, NULL, 0, slab, 1));
   qmat_report *report = evaluate(&s, "", 0);
   check_bounds(&s, report, "envelope_out_of_solid", 0.3, 0.05);
   qmat_value_release(&report->base);
@@ -158,7 +151,7 @@ static void test_the_groove_between_two_balls_is_the_farthest(void **state) {
   (void)state;
   /* Their common circle has the radius 0.6; it is farthest where y = z. The rest of both balls is no part of it. */
   static const double balls[] = {-0.8, 0, 0, 1, 0.8, 0, 0, 1};
-  subject s = subject_of(box_around(1.8, 1, 1), medial_mesh(balls, 2, NULL, 0, NULL, 0));
+  subject s = subject_of(shape_box_around(1.8, 1, 1), medial_mesh(balls, 2, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "", 0);
   check_bounds(&s, report, "envelope_to_surface", 1 - 0.6 / sqrt(2), 0.05);
   assert_int_equal(pipeline_count(report, "components"), 2);
@@ -172,7 +165,7 @@ static void test_a_cavity_in_the_envelope_counts(void **state) {
   double balls[24];
   for (int i = 0; i < 6; i++)
     for (int k = 0; k < 4; k++) balls[4 * i + k] = k == 3 ? 0.8 : k == i / 2 ? (i % 2 ? -1.3 : 1.3) : 0;
-  subject s = subject_of(box_around(2.1, 2.1, 2.1), medial_mesh(balls, 6, NULL, 0, NULL, 0));
+  subject s = subject_of(shape_box_around(2.1, 2.1, 2.1), medial_mesh(balls, 6, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "", 0);
   check_bounds(&s, report, "envelope_to_surface", 2.1 - 0.5, 0.05);
   qmat_value_release(&report->base);
@@ -182,7 +175,7 @@ static void test_a_cavity_in_the_envelope_counts(void **state) {
 static void test_certified_exactly_where_epsilon_holds(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
-  subject s = subject_of(box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
+  subject s = subject_of(shape_box_around(1, 1, 1), medial_mesh(ball, 1, NULL, 0, NULL, 0));
   const double truth = (sqrt(3) - 1) / s.diagonal;
   char params[64];
   for (int i = 0; i < 2; i++) { /* within the tolerance of 5 %: what is undecided is searched on */
@@ -201,7 +194,7 @@ static void test_certified_exactly_where_epsilon_holds(void **state) {
 static void test_the_deviation_of_the_mesh_is_part_of_both_errors(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
-  qmat_mesh *cube = box_around(1, 1, 1);
+  qmat_mesh *cube = shape_box_around(1, 1, 1);
   cube->deviation = 0.01;
   subject s = subject_of(cube, medial_mesh(ball, 1, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "tolerance=0.01", 0);
@@ -228,7 +221,7 @@ static void check_epsilon_is_told_from(const char *key, uint64_t seed, int step,
   for (int i = 0; i < 40; i++) {
     double balls[4 * 12];
     for (int k = 0; k < 48; k++) balls[k] = random_between(&random, k % 4 == 3 ? 0.02 : -0.6, k % 4 == 3 ? 0.4 : 0.6);
-    subject s = subject_of(box_around(0.7, 0.8, 0.9), medial_mesh(balls, 12, NULL, 0, NULL, 0));
+    subject s = subject_of(shape_box_around(0.7, 0.8, 0.9), medial_mesh(balls, 12, NULL, 0, NULL, 0));
     qmat_report *close = evaluate(&s, "epsilon=0 tolerance=0.001", 1);
     const double truth = pipeline_number(close, key);
     qmat_value_release(&close->base);
@@ -264,7 +257,7 @@ static void test_an_epsilon_just_above_the_error_is_certified(void **state) {
   (void)state;
   const double x = 0.137, left = sqrt((x + 0.9) * (x + 0.9) + 2), right = sqrt((x - 0.9) * (x - 0.9) + 2);
   const double balls[] = {-0.9, 0, 0, 0.7, 0.9, 0, 0, 0.7 + right - left};
-  subject s = subject_of(box_around(1.5, 1, 1), medial_mesh(balls, 2, NULL, 0, NULL, 0));
+  subject s = subject_of(shape_box_around(1.5, 1, 1), medial_mesh(balls, 2, NULL, 0, NULL, 0));
   const double truth = (left - 0.7) / s.diagonal;
   for (double above = 1e-4; above > 4e-6; above /= 2) {
     char params[64];
@@ -283,7 +276,7 @@ static void test_an_epsilon_just_above_the_error_is_certified(void **state) {
 static void test_an_open_surface_is_never_certified(void **state) {
   (void)state;
   static const double ball[] = {0, 0, 0, 1};
-  qmat_mesh *mesh = box_around(1, 1, 1);
+  qmat_mesh *mesh = shape_box_around(1, 1, 1);
   mesh->triangle_count--;
   subject s = subject_of(mesh, medial_mesh(ball, 1, NULL, 0, NULL, 0));
   qmat_report *report = evaluate(&s, "epsilon=50%", 0);
@@ -305,7 +298,7 @@ static void test_odd_spheres_cones_and_slabs_are_counted(void **state) {
                                    -1,   0, 0, 0,               /* on the surface */
                                    -0.5, 0, 0, 0.3};
   static const uint32_t edges[] = {0, 1, 0, 2, 0, 5}, slabs[] = {0, 3, 5}; /* collinear, and holds its third corner */
-  subject s = subject_of(box_around(1, 1, 1), medial_mesh(spheres, 6, edges, 3, slabs, 1));
+  subject s = subject_of(shape_box_around(1, 1, 1), medial_mesh(spheres, 6, edges, 3, slabs, 1));
   qmat_report *report = evaluate(&s, "", 0);
   assert_int_equal(pipeline_count(report, "duplicate_spheres"), 1);
   assert_int_equal(pipeline_count(report, "spheres_outside"), 1);
@@ -535,7 +528,7 @@ static void test_threads_change_no_byte(void **state) {
 /* ---- errors ---- */
 
 static void check_refused(qmat_medial *medial, const char *message, int64_t element) {
-  subject s = subject_of(box_around(1, 1, 1), medial);
+  subject s = subject_of(shape_box_around(1, 1, 1), medial);
   qmat_context context = {0};
   qmat_value *output = NULL;
   const qmat_value *inputs[] = {&s.mesh->base, &s.medial->base};

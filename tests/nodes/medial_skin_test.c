@@ -15,6 +15,7 @@
 #include "nodes/measure/boundary_features.h"
 #include "nodes/skin/flat_primitives.h"
 #include "tests/medial_meshes.h"
+#include "tests/nodes/pipeline.h"
 #include "tests/shapes.h"
 
 extern const qmat_node qmat_node_medial_skin;
@@ -46,7 +47,8 @@ static qmat_status try_skin(qmat_context *context, qmat_medial *medial, const ch
   }
   const qmat_value *inputs[1] = {&medial->base};
   qmat_value *outputs[2] = {NULL, NULL};
-  const qmat_status status = node->run(context, params, inputs, outputs);
+  qmat_status status = qmat_params_check(context, node, params);
+  if (status == QMAT_OK) status = node->run(context, params, inputs, outputs);
   if (status != QMAT_OK) {
     assert_null(outputs[0]);
     assert_null(outputs[1]);
@@ -819,20 +821,68 @@ static void test_flat_slabs_have_two_sides_and_flat_cones_are_prisms(void **unus
   qmat_context_uninit(&context);
 }
 
-static bool stop_at(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                    const char *unit) {
-  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  int *calls = user;
-  return --*calls > 0;
+/* Two spheres in one place have no line between them, so no prism; in the frame, two places may become one. */
+static void test_flat_cones_without_length_are_left_out(void **unused) {
+  (void)unused;
+  qmat_context context = {0};
+  skin_result result;
+  const uint32_t cone[] = {1, 2};
+  const double in_one_place[] = {0, 0, 0, 1, 5, 0, 0, 0, 5, 0, 0, 0};
+  assert_int_equal(try_skin(&context, sealed_medial_mesh(in_one_place, 3, cone, 1, NULL, 0), "resolution=16", &result),
+                   QMAT_OK);
+  assert_near(number_of(result, "flat_cones"), 0, 0);
+  assert_int_equal(result.mesh->triangle_count, (size_t)number_of(result, "triangles"));
+  release(result);
+  const double lengths[] = {1e-200, 5e-324};
+  for (int i = 0; i < 2; i++) {
+    const double near[] = {0, 0, 0, 1, 0, 0, 0, 0, 0, 0, lengths[i], 0};
+    assert_int_equal(try_skin(&context, sealed_medial_mesh(near, 3, cone, 1, NULL, 0), "resolution=16", &result),
+                     QMAT_OK);
+    assert_near(number_of(result, "flat_cones"), 1, 0);
+    assert_int_equal(result.mesh->triangle_count, 8 + (size_t)number_of(result, "triangles"));
+    release(result);
+  }
+  expect_error(sealed_medial_mesh(in_one_place + 4, 2, (const uint32_t[]){0, 1}, 1, NULL, 0), "", QMAT_ERROR_GEOMETRY,
+               "medial");
+  qmat_context_uninit(&context);
+}
+
+/* Meshes are what the error leaves of a contour, a contour itself, and CGAL's. */
+static void test_every_mesh_states_how_far_it_may_be_from_the_envelope(void **unused) {
+  (void)unused;
+  static const char *const settings[] = {"resolution=32 error=0.5%", "resolution=32 error=0", "method=skin_surface"};
+  qmat_context context = {0};
+  for (int i = 0; i < 3; i++) {
+    qmat_medial *medial = capsule(0.5);
+    qmat_envelope *envelope;
+    assert_int_equal(qmat_envelope_of_medial(&context, medial, &envelope), QMAT_OK);
+    skin_result result = skin(medial, settings[i]);
+    const double farthest = farthest_from(envelope, result.mesh), diagonal = number_of(result, "diagonal");
+    assert_true(farthest > 0 && result.mesh->deviation >= farthest);
+    assert_true(result.mesh->deviation < 2 * farthest + 1e-4 * diagonal);
+    assert_near(result.mesh->deviation,
+                diagonal * fmax(number_of(result, "mesh_to_envelope"), number_of(result, "envelope_to_mesh")), 0);
+    qmat_envelope_free(envelope);
+    release(result);
+  }
+  qmat_context_uninit(&context);
+}
+
+static void test_a_number_of_triangles_needs_an_error(void **unused) {
+  (void)unused;
+  expect_error(ball(), "error=0 triangles=500", QMAT_ERROR_USAGE, "triangles");
+  release(skin(ball(), "method=skin_surface error=0 triangles=500"));
 }
 
 static void test_a_run_can_be_cancelled(void **unused) {
   (void)unused;
-  int calls = 1;
-  qmat_context context = {.progress = stop_at, .progress_user = &calls};
-  skin_result result;
-  assert_int_equal(try_skin(&context, soup(1), "resolution=200", &result), QMAT_CANCELLED);
-  qmat_context_uninit(&context);
+  static const char *const settings[] = {"resolution=16 detail=1", "resolution=16 detail=1 error=0",
+                                         "method=skin_surface"};
+  for (int i = 0; i < 3; i++) {
+    qmat_medial *medial = i < 2 ? soup(1) : capsule(0);
+    pipeline_must_be_cancelled("medial.skin", settings[i], (const qmat_value *[]){&medial->base});
+    qmat_value_release(&medial->base);
+  }
 }
 
 int main(void) {
@@ -857,6 +907,9 @@ int main(void) {
       cmocka_unit_test(test_every_soup_of_primitives_is_a_closed_manifold),
       cmocka_unit_test(test_all_sides_of_slabs_with_volume_stay_with_them),
       cmocka_unit_test(test_flat_slabs_have_two_sides_and_flat_cones_are_prisms),
+      cmocka_unit_test(test_flat_cones_without_length_are_left_out),
+      cmocka_unit_test(test_every_mesh_states_how_far_it_may_be_from_the_envelope),
+      cmocka_unit_test(test_a_number_of_triangles_needs_an_error),
       cmocka_unit_test(test_thin_parts_stay_connected),
       cmocka_unit_test(test_cells_are_finer_where_radii_are_small),
       cmocka_unit_test(test_spheres_inside_others_change_nothing),

@@ -11,6 +11,7 @@
 
 #include "core/geometry/frame.h"
 #include "core/node.h"
+#include "tests/nodes/pipeline.h"
 #include "tests/shapes.h"
 
 extern const qmat_node qmat_node_mesh_sample;
@@ -20,24 +21,6 @@ typedef struct result {
   qmat_samples *samples;
   qmat_report *report;
 } result;
-
-/* "name=value name=value", or "". Without a spacing unless the text gives one: most tests are of eq. 7 alone. */
-static void set_params(qmat_context *context, const char *text, void *params) {
-  const qmat_node *node = &qmat_node_mesh_sample;
-  qmat_params_default(node, params);
-  assert_int_equal(qmat_param_parse(context, qmat_param_find(node, "spacing"), "0", params), QMAT_OK);
-  char copy[256];
-  assert_true(strlen(text) < sizeof copy);
-  memcpy(copy, text, strlen(text) + 1);
-  for (char *rest = copy, *word; (word = strtok_r(rest, " ", &rest)) != NULL;) {
-    char *value = strchr(word, '=');
-    assert_non_null(value);
-    *value++ = '\0';
-    const qmat_param *param = qmat_param_find(node, word);
-    assert_non_null(param);
-    if (qmat_param_parse(context, param, value, params) != QMAT_OK) fail_msg("%s", context->error.message);
-  }
-}
 
 static qmat_field *field_of(size_t count, const double *values, double otherwise) {
   qmat_context context = {0};
@@ -53,14 +36,14 @@ static qmat_field *field_of(size_t count, const double *values, double otherwise
   return field;
 }
 
+/* Without a spacing unless the text gives one: most tests are of eq. 7 alone. */
 static qmat_status try_sample(qmat_context *context, const qmat_mesh *mesh, const qmat_field *thickness,
                               const char *text, result *made) {
-  double params[16];
-  assert_true(qmat_node_mesh_sample.params_size <= sizeof params);
-  set_params(context, text, params);
-  const qmat_value *inputs[2] = {&mesh->base, &thickness->base};
-  qmat_value *outputs[2] = {NULL, NULL};
-  const qmat_status status = qmat_node_mesh_sample.run(context, params, inputs, outputs);
+  char settings[256];
+  assert_true(snprintf(settings, sizeof settings, "spacing=0 %s", text) < (int)sizeof settings);
+  qmat_value *outputs[PIPELINE_MOST_PORTS] = {NULL};
+  const qmat_status status =
+      pipeline_run(context, "mesh.sample", settings, (const qmat_value *[]){&mesh->base, &thickness->base}, outputs);
   assert_int_equal(status == QMAT_OK, outputs[0] != NULL);
   assert_int_equal(status == QMAT_OK, outputs[1] != NULL);
   *made = (result){(qmat_samples *)outputs[0], (qmat_report *)outputs[1]};
@@ -615,14 +598,16 @@ static void test_limit_on_samples_holds_for_spaced_ones_too(void **state) {
 static void test_spacing_below_a_ten_thousandth_is_refused(void **state) {
   (void)state;
   qmat_context context = {0};
+  const qmat_node *node = &qmat_node_mesh_sample;
   double params[16];
-  set_params(&context, "spacing=0.00009", params);
-  assert_int_equal(qmat_params_check(&context, &qmat_node_mesh_sample, params), QMAT_ERROR_USAGE);
-  assert_string_equal(context.error.field, "spacing");
-  set_params(&context, "spacing=0.0001", params);
-  assert_int_equal(qmat_params_check(&context, &qmat_node_mesh_sample, params), QMAT_OK);
-  set_params(&context, "spacing=0", params);
-  assert_int_equal(qmat_params_check(&context, &qmat_node_mesh_sample, params), QMAT_OK);
+  assert_true(node->params_size <= sizeof params);
+  qmat_params_default(node, params);
+  static const char *const spacings[] = {"0.00009", "0.0001", "0"};
+  for (int i = 0; i < 3; i++) {
+    assert_int_equal(qmat_param_parse(&context, qmat_param_find(node, "spacing"), spacings[i], params), QMAT_OK);
+    assert_int_equal(qmat_params_check(&context, node, params), i == 0 ? QMAT_ERROR_USAGE : QMAT_OK);
+    assert_string_equal(context.error.field, "spacing");
+  }
   qmat_context_uninit(&context);
 }
 
@@ -668,20 +653,11 @@ static void test_bad_inputs_are_named(void **state) {
   qmat_context_uninit(&context);
 }
 
-static bool refuse(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                   const char *unit) {
-  (void)user, (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  return false;
-}
-
 static void test_progress_function_cancels(void **state) {
   (void)state;
-  qmat_mesh *mesh = shape_seal(shape_box(1, 1, 1));
-  qmat_field *thickness = field_of(12, NULL, 1);
-  qmat_context context = {.progress = refuse};
-  result made;
-  assert_int_equal(try_sample(&context, mesh, thickness, "", &made), QMAT_CANCELLED);
-  qmat_context_uninit(&context);
+  qmat_mesh *mesh = shape_seal(shape_torus(1, 0.3, 120, 120));
+  qmat_field *thickness = field_of(mesh->triangle_count, NULL, 1);
+  pipeline_must_be_cancelled("mesh.sample", "", (const qmat_value *[]){&mesh->base, &thickness->base});
   qmat_value_release(&thickness->base);
   qmat_value_release(&mesh->base);
 }

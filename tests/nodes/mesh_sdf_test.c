@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/node.h"
+#include "tests/nodes/pipeline.h"
 #include "tests/shapes.h"
 
 extern const qmat_node qmat_node_mesh_sdf;
@@ -347,21 +348,12 @@ static void test_meshes_that_enclose_nothing_are_refused(void **state) {
   expect_geometry_error(inside_out);
 }
 
-static bool refuse(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                   const char *unit) {
-  (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  ++*(int *)user;
-  return false;
-}
-
+/* Enough facets for several slices, once for those that are measured and once for those that take a value. */
 static void test_progress_function_cancels(void **state) {
   (void)state;
-  int calls = 0;
-  qmat_context context = {.progress = refuse, .progress_user = &calls};
-  qmat_field *thickness;
-  assert_int_equal(try_sdf(&context, shape_seal(shape_torus(1, 0.3, 60, 60)), NULL, "100", &thickness), QMAT_CANCELLED);
-  assert_int_equal(calls, 1);
-  qmat_context_uninit(&context);
+  qmat_mesh *mesh = shape_seal(shape_torus(1, 0.3, 120, 60));
+  pipeline_must_be_cancelled("mesh.sdf", "", (const qmat_value *[]){&mesh->base});
+  qmat_value_release(&mesh->base);
 }
 
 int main(void) {

@@ -536,6 +536,7 @@ static void test_a_rigid_binding_is_of_all_points_and_a_bad_one_is_left_out_alou
        "float[] primvars:skel:jointWeights = [nan]\n",
        0},
   };
+  bool counted = false;
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     qmat_value *read[PIPELINE_MOST_PORTS];
     read_usd_arm("none", cases[i].binding, read);
@@ -545,10 +546,14 @@ static void test_a_rigid_binding_is_of_all_points_and_a_bad_one_is_left_out_alou
     for (size_t k = 0; k < json_array_size(warnings); k++)
       warned = warned || strstr(json_string_value(json_array_get(warnings, k)), "/r/arm: its joints are left out: ");
     if (i < 5) assert_int_equal(warned, cases[i].joint == 0);
+    for (size_t k = 0; i == 2 && k < json_array_size(warnings); k++)
+      counted = counted ||
+                strstr(json_string_value(json_array_get(warnings, k)), "left out: 3 values do not make 2 for each of ");
     if (i < 5) assert_int_equal(mesh->skinned_count, cases[i].joint ? mesh->vertex_count : 0);
     for (size_t v = 0; v < mesh->skinned_count; v++) assert_int_equal(mesh->joints[4 * v], cases[i].joint);
     for (int k = 0; k < 3; k++) qmat_value_release(read[k]);
   }
+  assert_true(counted);
 }
 
 int main(void) {

@@ -2,11 +2,13 @@
 // Headless Chromium, driven through its pipe, so that no package is needed.
 import { spawn } from 'node:child_process';
 
-/** `folder` gets the profile. */
+let profiles = 0;
+
+/** `folder` gets a profile; `options` say how to draw. */
 export class Browser {
-  constructor(chromium, folder) {
+  constructor(chromium, folder, options = ['--enable-unsafe-swiftshader']) {
     this.process = spawn(chromium, ['--headless=new', '--no-sandbox', '--remote-debugging-pipe', '--hide-scrollbars', '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader', `--user-data-dir=${folder}/profile`, 'about:blank'], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
+      `--user-data-dir=${folder}/profile${profiles++}`, ...options, 'about:blank'], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
     this.waiting = new Map();
     this.next = 1;
     this.listeners = [];
@@ -29,13 +31,14 @@ export class Browser {
     this.process.stdio[3].write(`${JSON.stringify({ id, method, params, sessionId: this.session })}\0`);
     return new Promise((give, fail) => this.waiting.set(id, { give, fail }));
   }
-  /** Opens the address; `listener` gets each message of the browser. */
-  async open(width, height, address, listener) {
+  /** Opens the address, on a narrow screen as a phone does; `listener` gets each message of the browser. */
+  async open(width, height, address, listener, dark = false) {
     const { targetId } = await this.send('Target.createTarget', { url: 'about:blank' });
     this.session = (await this.send('Target.attachToTarget', { targetId, flatten: true })).sessionId;
     this.listeners.push(listener);
-    for (const domain of ['Runtime', 'Log', 'Page']) await this.send(`${domain}.enable`);
-    await this.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: false });
+    for (const domain of ['Runtime', 'Log', 'Page', 'Network']) await this.send(`${domain}.enable`);
+    await this.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: width < 600 });
+    await this.send('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: dark ? 'dark' : 'light' }] });
     const loaded = new Promise((give) => this.listeners.push(({ method }) => method === 'Page.loadEventFired' && give()));
     await this.send('Page.navigate', { url: address });
     await loaded;

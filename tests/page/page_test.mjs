@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // page_test.mjs CHROMIUM FOLDER: opens FOLDER/page.html, and compares it with both.png, overlay.png, middle.ma, middle.json.
-// Chromium is driven through its pipe, so that no package is needed.
-import { spawn } from 'node:child_process';
 import { readFileSync } from 'node:fs';
+import { Browser } from './browser.mjs';
 
 const [chromium, folder] = process.argv.slice(2);
 const said = [];
@@ -14,60 +13,15 @@ function check(what, good, detail = '') {
   console.log(`FAILED: ${what} ${detail}`);
 }
 
-class Browser {
-  constructor(...options) {
-    this.process = spawn(chromium, ['--headless=new', '--no-sandbox', '--remote-debugging-pipe', '--hide-scrollbars', '--use-angle=swiftshader',
-      `--user-data-dir=${folder}/profile${Browser.count++}`, ...options, 'about:blank'], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
-    this.waiting = new Map();
-    this.next = 1;
-    this.listeners = [];
-    let text = '';
-    this.process.stdio[4].setEncoding('utf8').on('data', (data) => {
-      const parts = (text + data).split('\0');
-      text = parts.pop();
-      for (const part of parts) this.take(JSON.parse(part));
-    });
-  }
-  static count = 0;
-  take(message) {
-    const done = this.waiting.get(message.id);
-    if (done) {
-      this.waiting.delete(message.id);
-      if (message.error) done.fail(new Error(message.error.message));
-      else done.give(message.result);
-    }
-    for (const listener of this.listeners) listener(message);
-  }
-  send(method, params = {}) {
-    const id = this.next++;
-    this.process.stdio[3].write(`${JSON.stringify({ id, method, params, sessionId: this.session })}\0`);
-    return new Promise((give, fail) => this.waiting.set(id, { give, fail }));
-  }
-  async open(width, height, dark = false) {
-    const { targetId } = await this.send('Target.createTarget', { url: 'about:blank' });
-    this.session = (await this.send('Target.attachToTarget', { targetId, flatten: true })).sessionId;
-    this.listeners.push(({ method, params }) => {
-      if (method === 'Runtime.consoleAPICalled') said.push(params.args.map((x) => x.value ?? x.description).join(' '));
-      if (method === 'Runtime.exceptionThrown') said.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
-      if (method === 'Log.entryAdded') said.push(params.entry.text);
-      if (method === 'Network.requestWillBeSent' && !/^(file|data|blob):/.test(params.request.url)) said.push(`a request: ${params.request.url}`);
-    });
-    for (const domain of ['Runtime', 'Log', 'Page', 'Network']) await this.send(`${domain}.enable`);
-    await this.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: width < 600 });
-    await this.send('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: dark ? 'dark' : 'light' }] });
-    const loaded = new Promise((give) => this.listeners.push(({ method }) => method === 'Page.loadEventFired' && give()));
-    await this.send('Page.navigate', { url: `file://${folder}/page.html` });
-    await loaded;
-    for (let i = 0; i < 100 && !(await this.run('return Boolean(globalThis.qmatPage)')); i++) await new Promise((give) => setTimeout(give, 100));
-  }
-  async run(expression) {
-    const { result, exceptionDetails } = await this.send('Runtime.evaluate', { expression: `(async () => { ${expression} })()`, awaitPromise: true, returnByValue: true });
-    if (exceptionDetails) throw new Error(exceptionDetails.exception?.description ?? exceptionDetails.text);
-    return result.value;
-  }
-  close() {
-    this.process.kill();
-  }
+/** Opens the page, listens to what it says and fetches, and waits until it is there. */
+async function open(browser, width, height, dark) {
+  await browser.open(width, height, `file://${folder}/page.html`, ({ method, params }) => {
+    if (method === 'Runtime.consoleAPICalled') said.push(params.args.map((x) => x.value ?? x.description).join(' '));
+    if (method === 'Runtime.exceptionThrown') said.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
+    if (method === 'Log.entryAdded') said.push(params.entry.text);
+    if (method === 'Network.requestWillBeSent' && !/^(file|data|blob):/.test(params.request.url)) said.push(`a request: ${params.request.url}`);
+  }, dark);
+  for (let i = 0; i < 100 && !(await browser.run('return Boolean(globalThis.qmatPage)')); i++) await new Promise((give) => setTimeout(give, 100));
 }
 
 /** How two images differ: the mean of all channels, and the share of pixels with a channel that differs by more than 48. */
@@ -203,7 +157,7 @@ const LAYOUT = `
   return { wide, over, canvas: !document.getElementById('canvas').hidden, still: document.getElementById('still').getBoundingClientRect().width };`;
 
 async function inBrowser(options, act) {
-  const browser = new Browser(...options);
+  const browser = new Browser(chromium, folder, options);
   const limit = setTimeout(() => browser.close(), 150000);
   try {
     await act(browser);
@@ -214,7 +168,7 @@ async function inBrowser(options, act) {
 }
 
 await inBrowser(['--enable-unsafe-swiftshader'], async (browser) => {
-  await browser.open(1280, 900);
+  await open(browser, 1280, 900);
   if (!(await browser.run("return !document.getElementById('canvas').hidden"))) {
     console.log('skipped in part: this Chromium has no WebGL 2');
     process.exitCode = 77;
@@ -225,7 +179,7 @@ await inBrowser(['--enable-unsafe-swiftshader'], async (browser) => {
   await testHands(browser);
   await testLostContext(browser);
   for (const [width, dark] of [[360, false], [768, true], [1600, false]]) {
-    await browser.open(width, 900, dark);
+    await open(browser, width, 900, dark);
     const layout = await browser.run(LAYOUT);
     check(`nothing overlaps at ${width} pixels`, layout.wide.length === 0 && layout.over.length === 0, JSON.stringify(layout));
     const paper = await browser.run('return getComputedStyle(document.body).backgroundColor');
@@ -233,7 +187,7 @@ await inBrowser(['--enable-unsafe-swiftshader'], async (browser) => {
   }
 });
 await inBrowser(['--disable-3d-apis'], async (browser) => {
-  await browser.open(360, 900);
+  await open(browser, 360, 900);
   const layout = await browser.run(LAYOUT);
   check('without WebGL there is a picture, and the numbers', !layout.canvas && layout.still > 300 && layout.wide.length === 0, JSON.stringify(layout));
 });

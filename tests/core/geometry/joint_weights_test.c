@@ -71,8 +71,8 @@ static void test_a_turn_of_a_joint_moves_the_spheres_of_its_side(void **state) {
   qmat_mesh *mesh = skinned_capsule();
   qmat_medial *medial = row_of_spheres(), *again = row_of_spheres();
   qmat_context context = {.threads = 1}, parallel = {.threads = 8};
-  assert_int_equal(qmat_skin_spheres(&context, mesh, medial), QMAT_OK);
-  assert_int_equal(qmat_skin_spheres(&parallel, mesh, again), QMAT_OK);
+  assert_int_equal(qmat_joints_of_spheres(&context, mesh, medial), QMAT_OK);
+  assert_int_equal(qmat_joints_of_spheres(&parallel, mesh, again), QMAT_OK);
   assert_int_equal(medial->skinned_count, 5);
   assert_memory_equal(medial->weights, again->weights, 20 * sizeof *medial->weights);
   assert_memory_equal(medial->joints, again->joints, 20 * sizeof *medial->joints);
@@ -108,7 +108,7 @@ static void test_a_mesh_without_a_skin_leaves_spheres_as_they_are(void **state) 
   qmat_context context = {0};
   qmat_mesh *mesh = shape_seal(shape_sphere(1, 8));
   qmat_medial *medial = row_of_spheres();
-  assert_int_equal(qmat_skin_spheres(&context, mesh, medial), QMAT_OK);
+  assert_int_equal(qmat_joints_of_spheres(&context, mesh, medial), QMAT_OK);
   assert_int_equal(medial->skinned_count, 0);
   assert_null(medial->joints);
   qmat_value_release(&mesh->base);
@@ -145,7 +145,7 @@ static void test_points_of_the_envelope_follow_the_spheres_beside_them(void **st
   uint32_t joints[20];
   double weights[20];
   qmat_context context = {.threads = 2};
-  assert_int_equal(qmat_skin_envelope(&context, medial, &mesh, joints, weights), QMAT_OK);
+  assert_int_equal(qmat_joints_of_envelope(&context, medial, &mesh, joints, weights), QMAT_OK);
   for (size_t v = 0; v < 5; v++) {
     for (size_t e = 0; e < 3; e++) {
       double found = 0;

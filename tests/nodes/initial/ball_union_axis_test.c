@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/vector.h"
+#include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
 
@@ -24,18 +25,12 @@ static qmat_medial *axis_of(const double *balls, size_t count, double merge) {
   return medial;
 }
 
-static void assert_counts(const qmat_medial *medial, size_t spheres, size_t edges, size_t triangles) {
-  assert_int_equal(medial->sphere_count, spheres);
-  assert_int_equal(medial->edge_count, edges);
-  assert_int_equal(medial->triangle_count, triangles);
-}
-
 static void test_one_ball_is_its_centre_and_a_ball_inside_it_adds_nothing(void **state) {
   (void)state;
   static const double balls[] = {0.1, 0, 0, 0.3, 0.15, 0, 0, 0.1};
   for (size_t count = 1; count <= 2; count++) {
     qmat_medial *medial = axis_of(balls, count, 0);
-    assert_counts(medial, 1, 0, 0);
+    medial_must_have(medial, 1, 0, 0);
     assert_memory_equal(medial->spheres, balls, 4 * sizeof *balls);
     qmat_value_release(&medial->base);
   }
@@ -45,10 +40,10 @@ static void test_two_balls_that_overlap_are_an_edge_and_two_apart_are_two_compon
   (void)state;
   static const double together[] = {0, 0, 0, 0.3, 0.4, 0, 0, 0.2}, apart[] = {0, 0, 0, 0.1, 0.4, 0, 0, 0.2};
   qmat_medial *medial = axis_of(together, 2, 0);
-  assert_counts(medial, 2, 1, 0);
+  medial_must_have(medial, 2, 1, 0);
   qmat_value_release(&medial->base);
   medial = axis_of(apart, 2, 0);
-  assert_counts(medial, 2, 0, 0);
+  medial_must_have(medial, 2, 0, 0);
   qmat_value_release(&medial->base);
 }
 
@@ -60,7 +55,7 @@ static void test_three_balls_are_a_triangle_where_they_have_a_common_point_and_e
     const double r = sqrt(0.03) + (filled ? 0.01 : -0.01);
     const double balls[] = {0, 0, 0, r, 0.3, 0, 0, r, 0.15, 0.15 * sqrt(3), 0, r};
     qmat_medial *medial = axis_of(balls, 3, 0);
-    assert_counts(medial, 3, 3, filled ? 1 : 0);
+    medial_must_have(medial, 3, 3, filled ? 1 : 0);
     qmat_value_release(&medial->base);
   }
 }
@@ -72,7 +67,7 @@ static void test_four_balls_are_a_cone_from_the_centroid_to_the_sides_of_their_t
   const double h = 0.1, r = 0.25;
   const double balls[] = {h, h, h, r, h, -h, -h, r, -h, h, -h, r, -h, -h, h, r};
   qmat_medial *medial = axis_of(balls, 4, 0);
-  assert_counts(medial, 5, 10, 6);
+  medial_must_have(medial, 5, 10, 6);
   /* The corner of the last three is at -t (1, 1, 1): (t + h)^2 + 2 (t - h)^2 = r^2. */
   const double t = (h + sqrt(h * h - 3 * (3 * h * h - r * r))) / 3;
   size_t centroid = SIZE_MAX;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/initial/sample_spacing.h"
 #include "core/geometry/triangle.h"
+#include "core/geometry/vector.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -174,10 +175,6 @@ static void random_corner(random_numbers *random, double p[3]) {
   for (int k = 0; k < 3; k++) p[k] = random_between(random, -1, 1);
 }
 
-static double distance(const double *a, const double *b) {
-  return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
 static void mix(const double *weights, const double *const corners[3], double p[3]) {
   for (int k = 0; k < 3; k++)
     p[k] = weights[0] * corners[0][k] + weights[1] * corners[1][k] + weights[2] * corners[2][k];
@@ -225,7 +222,7 @@ static void test_every_place_of_a_facet_has_a_point_within_the_spacing(void **st
         const double weights[3] = {(30 - i - j) / 30.0, i / 30.0, j / 30.0};
         double p[3], least = INFINITY;
         mix(weights, corners, p);
-        for (size_t k = 0; k < count; k++) least = fmin(least, distance(p, points[k]));
+        for (size_t k = 0; k < count; k++) least = fmin(least, qmat_point_distance(p, points[k]));
         assert_true(least <= spacing);
       }
     free(points);
@@ -257,7 +254,7 @@ static void test_points_in_rows_lie_inside_and_apart(void **state) {
       assert_near(weights[3 * i] + weights[3 * i + 1] + weights[3 * i + 2], 1, 1e-15);
       mix(&weights[3 * i], corners, points[i]);
       /* Rows may be closer than the spacing where they round up, points of one row too. */
-      for (size_t j = 0; j < i; j++) assert_true(distance(points[i], points[j]) > 0.3 * spacing);
+      for (size_t j = 0; j < i; j++) assert_true(qmat_point_distance(points[i], points[j]) > 0.3 * spacing);
     }
     free(weights);
     free(points);
@@ -307,7 +304,7 @@ static void test_keys_move_the_points_a_little(void **state) {
     double p[3], q[3];
     mix(&one[3 * i], corners, p);
     mix(&other[3 * i], corners, q);
-    assert_true(distance(p, q) > 0 && distance(p, q) < 0.5 * 0.1);
+    assert_true(qmat_point_distance(p, q) > 0 && qmat_point_distance(p, q) < 0.5 * 0.1);
   }
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/hash.h"
 #include "nodes/initial/sample_thinning.h"
+#include "tests/nodes/pipeline.h"
 
 enum { MOST = 4000 };
 
@@ -111,21 +112,35 @@ static void test_random_samples_agree_with_brute_force(void **state) {
   assert_true(kept > MOST / 10 && kept < 9 * MOST / 10);
 }
 
-static bool refuse(void *user, const char *node_id, const char *node_type, uint64_t done, uint64_t total,
-                   const char *unit) {
-  (void)user, (void)node_id, (void)node_type, (void)done, (void)total, (void)unit;
-  return false;
-}
-
-static void test_nothing_and_a_cancelled_run(void **state) {
+static void test_nothing_takes_no_sample(void **state) {
   (void)state;
   cloud c = {0};
   thin(&c, 0.1, 0.01);
-  add(&c, 0, 0, 0, 0, 0, 1, 0.1);
-  qmat_context context = {.progress = refuse};
-  assert_int_equal(qmat_samples_thin(&context, c.points, c.normals, c.radii, 1, 0.1, 0.01, c.representatives),
-                   QMAT_CANCELLED);
-  qmat_context_uninit(&context);
+}
+
+/* Samples of a line, for three calls of the progress function; it is obeyed at each. */
+static void test_a_run_is_cancelled_at_any_call(void **state) {
+  (void)state;
+  enum { COUNT = 150000 };
+  double *points = calloc(COUNT, 3 * sizeof *points), *normals = calloc(COUNT, 3 * sizeof *normals);
+  double *radii = malloc(COUNT * sizeof *radii);
+  uint32_t *representatives = malloc(COUNT * sizeof *representatives);
+  assert_true(points && normals && radii && representatives);
+  for (size_t i = 0; i < COUNT; i++) points[3 * i] = (double)i / COUNT, normals[3 * i + 2] = 1, radii[i] = 0.5 / COUNT;
+  for (size_t stop_at = 0; stop_at <= 3; stop_at++) {
+    qmat_context context = {.progress = pipeline_may_go_on};
+    pipeline_stopper stopper = {.context = &context, .stop_at = stop_at};
+    context.progress_user = &stopper;
+    assert_int_equal(
+        qmat_samples_thin(&context, points, normals, radii, COUNT, 0.5 / COUNT, 0.5 / COUNT, representatives),
+        stop_at < 3 ? QMAT_CANCELLED : QMAT_OK);
+    assert_int_equal(stopper.calls, stop_at < 3 ? stop_at + 1 : 3);
+    qmat_context_uninit(&context);
+  }
+  free(points);
+  free(normals);
+  free(radii);
+  free(representatives);
 }
 
 int main(void) {
@@ -133,7 +148,8 @@ int main(void) {
       cmocka_unit_test(test_earlier_samples_stand_for_later_ones_within_their_radius),
       cmocka_unit_test(test_other_sides_and_other_planes_are_kept),
       cmocka_unit_test(test_random_samples_agree_with_brute_force),
-      cmocka_unit_test(test_nothing_and_a_cancelled_run),
+      cmocka_unit_test(test_nothing_takes_no_sample),
+      cmocka_unit_test(test_a_run_is_cancelled_at_any_call),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,20 +11,18 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_build.h"
+#include "core/geometry/vector.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
+#include "tests/random_collapse.h"
 
 #define ROUNDING 1e-9
-
-static double distance(const double *a, const double *b) {
-  return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
 
 /* The largest h = r - depth over a dense grid of a primitive, and how far its points are from each other at most. */
 static double sampled(const qmat_surface *surface, const double *const spheres[], int count, int steps, double *gap) {
   double most = -INFINITY, longest = 0;
   for (int i = 0; i < count; i++)
-    for (int j = 0; j < i; j++) longest = fmax(longest, distance(spheres[i], spheres[j]));
+    for (int j = 0; j < i; j++) longest = fmax(longest, qmat_point_distance(spheres[i], spheres[j]));
   *gap = longest / steps;
   for (int i = 0; i <= (count > 1 ? steps : 0); i++)
     for (int j = 0; j <= (count > 2 ? steps - i : 0); j++) {
@@ -149,7 +147,7 @@ static void check_random_primitives(qmat_mesh *mesh, uint64_t seed) {
     double slope = 1;
     for (int i = 0; i < count; i++)
       for (int j = 0; j < i; j++) {
-        const double apart = distance(spheres[i], spheres[j]);
+        const double apart = qmat_point_distance(spheres[i], spheres[j]);
         if (apart > 0) slope = fmax(slope, 1 + fabs(spheres[i][3] - spheres[j][3]) / apart);
       }
     assert_true(bound <= most + tolerance + 2 * slope * gap + ROUNDING);
@@ -270,27 +268,14 @@ static void check_midpoints(const model *m, const double sphere[4], double exemp
   if (!close) assert_int_equal(inside, all);
 }
 
-static uint32_t random_live_edge(random_numbers *random, const qmat_complex *complex) {
-  for (;;) {
-    const size_t e = random_index(random, complex->edge_count);
-    if (complex->edge_alive[e]) return (uint32_t)e;
-  }
-}
-
 /* Random collapses, each accepted one checked around the merged vertex, and all of them at the end. */
 static void collapse_at_random(model *m, uint64_t seed, double exempt_radius, size_t least) {
   random_numbers random = {.seed = seed};
   size_t collapses = 0, by_sphere = 0, by_midpoints = 0, by_limit = 0, idle = 0;
   check_all(m, 3);
   while (m->complex.live_edges > 0 && idle < 1000) {
-    const uint32_t edge = random_live_edge(&random, &m->complex);
-    const uint32_t *ends = &m->complex.edges[2 * (size_t)edge];
-    const double *a = &m->complex.spheres[4 * (size_t)ends[0]], *b = &m->complex.spheres[4 * (size_t)ends[1]];
     double sphere[4];
-    const double t = random_index(&random, 3) == 0 ? random_between(&random, 0, 1) : (double)random_index(&random, 2);
-    for (int k = 0; k < 4; k++) sphere[k] = (1 - t) * a[k] + t * b[k];
-    if (random_index(&random, 4) == 0) sphere[random_index(&random, 4)] += random_between(&random, -0.02, 0.02);
-    sphere[3] = fmax(sphere[3], 0);
+    const uint32_t edge = random_collapse(&random, &m->complex, 0.02, sphere);
     bool kept = true;
     assert_int_equal(qmat_complex_preview(&m->context, &m->complex, edge, &m->collapse), QMAT_OK);
     const bool good = qmat_envelope_to_surface_test_sphere(&m->envelope_tracker, &m->complex, &m->collapse, sphere);

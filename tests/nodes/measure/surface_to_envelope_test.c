@@ -15,6 +15,7 @@
 #include "tests/medial_distances.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"
+#include "tests/random_collapse.h"
 
 #define ROUNDING 1e-9
 
@@ -293,13 +294,6 @@ static void check(model *m) {
   qmat_envelope_free(envelope);
 }
 
-static uint32_t random_live_edge(random_numbers *random, const qmat_complex *complex) {
-  for (;;) {
-    const size_t e = random_index(random, complex->edge_count);
-    if (complex->edge_alive[e]) return (uint32_t)e;
-  }
-}
-
 /* Whether every point of the collapse's two regions is within its limit of the new complex, by asking all of it. */
 static void check_refusal(model *m, const double sphere[4]) {
   const uint32_t kept = m->collapse.kept, removed = m->collapse.removed;
@@ -331,14 +325,8 @@ static void collapse_at_random(model *m, uint64_t seed, size_t least, size_t che
   const size_t every = least / checks;
   check(m);
   while (m->complex.live_edges > 0 && idle < 2000) {
-    const uint32_t edge = random_live_edge(&random, &m->complex);
-    const uint32_t *ends = &m->complex.edges[2 * (size_t)edge];
-    const double *a = &m->complex.spheres[4 * (size_t)ends[0]], *b = &m->complex.spheres[4 * (size_t)ends[1]];
     double sphere[4];
-    const double t = random_index(&random, 3) == 0 ? random_between(&random, 0, 1) : (double)random_index(&random, 2);
-    for (int k = 0; k < 4; k++) sphere[k] = (1 - t) * a[k] + t * b[k];
-    if (random_index(&random, 4) == 0) sphere[random_index(&random, 4)] += random_between(&random, -0.01, 0.01);
-    sphere[3] = fmax(sphere[3], 0);
+    const uint32_t edge = random_collapse(&random, &m->complex, 0.01, sphere);
     bool kept;
     assert_int_equal(qmat_complex_preview(&m->context, &m->complex, edge, &m->collapse), QMAT_OK);
     assert_int_equal(qmat_surface_to_envelope_test(&m->context, &m->surface_tracker, &m->complex, &m->collapse, sphere,

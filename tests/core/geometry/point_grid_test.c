@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
+#include "core/geometry/point_grid.h"
 #include "core/hash.h"
-#include "nodes/measure/point_grid.h"
 
 static uint32_t nearest_of_all(const double *points, size_t count, const double *place) {
   double best = INFINITY;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef QMAT_NODES_MEASURE_POINT_GRID_H
-#define QMAT_NODES_MEASURE_POINT_GRID_H
+#ifndef QMAT_CORE_GEOMETRY_POINT_GRID_H
+#define QMAT_CORE_GEOMETRY_POINT_GRID_H
 
 #include "core/context.h"
 

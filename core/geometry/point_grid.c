@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "nodes/measure/point_grid.h"
+#include "core/geometry/point_grid.h"
 
 #include <math.h>
 
