@@ -77,7 +77,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, &qmat_libra
 
 const qmat_node qmat_node_scene_read = {
     .name = "scene.read",
-    .version = 22,
+    .version = 23,
     .summary = "Reads a 3D model as a triangle mesh, or one for each mesh of a glTF or USD scene",
     .doc =
         "The file's first bytes give the format. Equal vertices are merged, polygons triangulated, unused vertices "
