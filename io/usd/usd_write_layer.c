@@ -9,8 +9,8 @@
 #include "core/json_text.h"
 #include "core/node.h"
 #include "io/collider_frames.h"
-#include "io/usd/usd_below.h"
 #include "io/usd/usd_colliders.h"
+#include "io/usd/usd_kept_scene.h"
 #include "io/usd/usd_write.h"
 #include "io/usd/usdc_write.h"
 #include "io/usd/usdz.h"
@@ -20,7 +20,7 @@ typedef struct carrier {
   const char *path;
   uint32_t mesh;
   size_t place; /* number in the scene's placements */
-  qmat_usd_beneath beneath;
+  qmat_usd_kept_prim kept_prim;
 } carrier;
 
 static qmat_status fail_shortage(qmat_context *context) {
@@ -118,9 +118,9 @@ static bool has_valid_names(const char *path) {
 enum { LONGEST_STEM = 31, MOST_VARIANTS_NAMED = 3 };
 
 /* Chooses the stem, so that no prim of the original gets opinions that are meant for another. */
-static void choose_stem(const qmat_usd_below *below, char stem[LONGEST_STEM + 1]) {
+static void choose_stem(const qmat_usd_kept_scene *kept, char stem[LONGEST_STEM + 1]) {
   snprintf(stem, LONGEST_STEM + 1, "medial_");
-  for (unsigned i = 2; qmat_usd_below_has_stem(below, stem) && i < 1000; i++)
+  for (unsigned i = 2; qmat_usd_kept_scene_has_stem(kept, stem) && i < 1000; i++)
     snprintf(stem, LONGEST_STEM + 1, "medial%u_", i);
 }
 
@@ -145,10 +145,10 @@ static void put_empty_prim(qmat_writer *writer, size_t depth, const char *kind, 
 
 /* Hides the medial meshes that a prim has already: of a scene that was flattened after an earlier run, or that refers
  * to a layer of one. */
-static void hide_earlier(qmat_writer *writer, size_t depth, const qmat_usd_beneath *beneath) {
-  for (size_t i = 0; i < beneath->medial_count; i++)
-    if (is_valid_name(beneath->medials[i]))
-      put_empty_prim(writer, depth, "over", beneath->medials[i], "active = false");
+static void hide_earlier(qmat_writer *writer, size_t depth, const qmat_usd_kept_prim *kept_prim) {
+  for (size_t i = 0; i < kept_prim->medial_count; i++)
+    if (is_valid_name(kept_prim->medials[i]))
+      put_empty_prim(writer, depth, "over", kept_prim->medials[i], "active = false");
 }
 
 static void put_reference(qmat_writer *writer, size_t depth, const char *stem, uint32_t mesh) {
@@ -188,16 +188,16 @@ static int warn_of_variant(json_t *report, const char *path, const qmat_usd_spec
 }
 
 /* Finds what the scene says of the carriers. */
-static qmat_status find_beneath(qmat_context *context, qmat_usd_below *below, carriers *list, json_t *report) {
+static qmat_status find_kept_prims(qmat_context *context, qmat_usd_kept_scene *kept, carriers *list, json_t *report) {
   qmat_status status = QMAT_OK;
   size_t variants = 0;
   bool failed = false;
   for (size_t i = 0; i < list->count && status == QMAT_OK; i++) {
     carrier *at = &list->items[i];
-    status = qmat_usd_below_find(below, at->path, &at->beneath);
-    if (status != QMAT_OK || !at->beneath.variant || !report) continue;
+    status = qmat_usd_kept_scene_find(kept, at->path, &at->kept_prim);
+    if (status != QMAT_OK || !at->kept_prim.variant || !report) continue;
     if (variants++ < MOST_VARIANTS_NAMED)
-      failed = failed || warn_of_variant(report, at->path, at->beneath.variant) != 0;
+      failed = failed || warn_of_variant(report, at->path, at->kept_prim.variant) != 0;
   }
   if (status == QMAT_OK && variants > MOST_VARIANTS_NAMED)
     failed = failed || qmat_json_add_warning(report, "and %zu more prims have the shape of a variant",
@@ -228,7 +228,7 @@ static void put_overs(const qmat_scene *scene, const qmat_usd_addition *addition
       body = open - 1;
       put_body(writer, open, scene, at->place, options, kilograms > 0 ? kilograms : 1);
     }
-    hide_earlier(writer, open, &at->beneath);
+    hide_earlier(writer, open, &at->kept_prim);
     put_reference(writer, open, stem, scene->meshes[at->mesh]);
   }
   while (open > 0) {
@@ -289,16 +289,16 @@ static const char *ending_of(const qmat_file_part *part) {
 }
 
 static qmat_status put_text(qmat_context *context, const qmat_scene *scene, const qmat_usd_addition *additions,
-                            size_t count, const qmat_usd_below *below, const carriers *list, const char *sublayer,
+                            size_t count, const qmat_usd_kept_scene *kept, const carriers *list, const char *sublayer,
                             qmat_writer *text) {
-  const qmat_usd_layer *original = qmat_usd_stage_root_layer(below->stage);
+  const qmat_usd_layer *original = qmat_usd_stage_root_layer(kept->stage);
   qmat_status status = QMAT_OK;
   char stem[LONGEST_STEM + 1];
   const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
   if (plain == (locale_t)0) return fail_shortage(context);
   const locale_t before = uselocale(plain);
   put_metadata(text, original->root, scene->is_z_up, sublayer);
-  choose_stem(below, stem);
+  choose_stem(kept, stem);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     char prim[LONGEST_STEM + 16];
     if (!additions[i].medial) continue;
@@ -374,21 +374,21 @@ qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene,
   const qmat_usd_form form = additions[0].options.form;
   const bool in_package = form == QMAT_USD_PACKAGE;
   char sublayer[512];
-  qmat_usd_below below = {0};
+  qmat_usd_kept_scene kept = {0};
   carriers list = {0};
   qmat_usdz original = {0};
   qmat_writer text = {0};
   *file = NULL;
   qmat_status status = open_original(context, part, ending, &original);
-  if (status == QMAT_OK) status = qmat_usd_below_open(context, part, &below);
+  if (status == QMAT_OK) status = qmat_usd_kept_scene_open(context, part, &kept);
   if (status == QMAT_OK) status = list_carriers(context, scene, additions, &list);
-  if (status == QMAT_OK) status = find_beneath(context, &below, &list, report);
+  if (status == QMAT_OK) status = find_kept_prims(context, &kept, &list, report);
   if (status == QMAT_OK) {
     if (in_package && original.member_count > 0)
       snprintf(sublayer, sizeof sublayer, "original/%s", original.members[0].name);
     else
       snprintf(sublayer, sizeof sublayer, in_package ? "original/scene.%s" : "original.%s", ending);
-    status = put_text(context, scene, additions, count, &below, &list, sublayer, &text);
+    status = put_text(context, scene, additions, count, &kept, &list, sublayer, &text);
   }
   if (status == QMAT_OK && text.failed) status = fail_shortage(context);
   if (status == QMAT_OK && form == QMAT_USD_CRATE) status = qmat_usdc_of_text(context, &text);
@@ -398,6 +398,6 @@ qmat_status qmat_usd_write_layer(qmat_context *context, const qmat_scene *scene,
   qmat_writer_uninit(&text);
   qmat_usdz_uninit(&original);
   qmat_free(list.items);
-  qmat_usd_below_close(&below);
+  qmat_usd_kept_scene_close(&kept);
   return status;
 }

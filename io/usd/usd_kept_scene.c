@@ -1,83 +1,83 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "io/usd/usd_below.h"
+#include "io/usd/usd_kept_scene.h"
 
 #include <string.h>
 
 #include "io/usd/usd_files.h"
 #include "io/usd/usdz.h"
 
-qmat_status qmat_usd_below_open(qmat_context *context, const qmat_file_part *part, qmat_usd_below *below) {
-  *below = (qmat_usd_below){.prims = qmat_calloc(QMAT_USD_DEEPEST + 1, sizeof *below->prims)};
-  if (!below->prims) return qmat_fail_memory(context, "the output file");
+qmat_status qmat_usd_kept_scene_open(qmat_context *context, const qmat_file_part *part, qmat_usd_kept_scene *kept) {
+  *kept = (qmat_usd_kept_scene){.prims = qmat_calloc(QMAT_USD_DEEPEST + 1, sizeof *kept->prims)};
+  if (!kept->prims) return qmat_fail_memory(context, "the output file");
   qmat_bytes bytes = {.data = part->bytes, .size = part->size};
   if (!qmat_usdz_is_package(part->bytes, part->size)) {
     /* A package refers to nothing outside of it. */
-    qmat_usdz_put(&below->package, "scene.usd", part->bytes, part->size);
-    if (below->package.failed) return qmat_fail_memory(context, "the output file");
-    bytes = (qmat_bytes){.data = below->package.bytes, .size = below->package.size};
+    qmat_usdz_put(&kept->package, "scene.usd", part->bytes, part->size);
+    if (kept->package.failed) return qmat_fail_memory(context, "the output file");
+    bytes = (qmat_bytes){.data = kept->package.bytes, .size = kept->package.size};
   }
-  const qmat_status status = qmat_usd_stage_open(context, &bytes, "the scene", &below->stage);
-  return status == QMAT_OK ? qmat_usd_stage_root(below->stage, &below->prims[0]) : status;
+  const qmat_status status = qmat_usd_stage_open(context, &bytes, "the scene", &kept->stage);
+  return status == QMAT_OK ? qmat_usd_stage_root(kept->stage, &kept->prims[0]) : status;
 }
 
 /* Closes the prims below a depth. */
-static void close_prims(qmat_usd_below *below, size_t depth) {
-  for (; below->depth > depth; below->depth--) qmat_usd_prim_uninit(&below->prims[below->depth]);
+static void close_prims(qmat_usd_kept_scene *kept, size_t depth) {
+  for (; kept->depth > depth; kept->depth--) qmat_usd_prim_uninit(&kept->prims[kept->depth]);
 }
 
-void qmat_usd_below_close(qmat_usd_below *below) {
-  if (below->prims) {
-    close_prims(below, 0);
-    qmat_usd_prim_uninit(&below->prims[0]);
+void qmat_usd_kept_scene_close(qmat_usd_kept_scene *kept) {
+  if (kept->prims) {
+    close_prims(kept, 0);
+    qmat_usd_prim_uninit(&kept->prims[0]);
   }
-  qmat_free(below->prims);
-  qmat_usd_stage_close(below->stage);
-  qmat_writer_uninit(&below->package);
-  qmat_arena_uninit(&below->arena);
-  *below = (qmat_usd_below){0};
+  qmat_free(kept->prims);
+  qmat_usd_stage_close(kept->stage);
+  qmat_writer_uninit(&kept->package);
+  qmat_arena_uninit(&kept->arena);
+  *kept = (qmat_usd_kept_scene){0};
 }
 
 /* Composes the prims of a path, but for those that are open. `*found`: all of them are there. */
-static qmat_status open_prims(qmat_usd_below *below, const char *path, bool *found) {
+static qmat_status open_prims(qmat_usd_kept_scene *kept, const char *path, bool *found) {
   size_t depth = 0;
   *found = true;
   while (*path && *found) {
     const size_t length = strcspn(++path, "/");
-    const char *open = depth < below->depth ? below->prims[depth + 1].name : NULL;
+    const char *open = depth < kept->depth ? kept->prims[depth + 1].name : NULL;
     if (!open || strncmp(open, path, length) != 0 || open[length] != '\0') {
       const char *name;
-      close_prims(below, depth);
-      qmat_status status = qmat_usd_prim_find_child(&below->prims[depth], path, length, &name);
+      close_prims(kept, depth);
+      qmat_status status = qmat_usd_prim_find_child(&kept->prims[depth], path, length, &name);
       if (status != QMAT_OK) return status;
       *found = name && depth < QMAT_USD_DEEPEST;
       if (!*found) return QMAT_OK;
-      below->depth = depth + 1;
-      status = qmat_usd_prim_child(below->stage, &below->prims[depth], name, &below->prims[depth + 1]);
+      kept->depth = depth + 1;
+      status = qmat_usd_prim_child(kept->stage, &kept->prims[depth], name, &kept->prims[depth + 1]);
       if (status != QMAT_OK) return status;
     }
     path += length;
     depth++;
   }
-  close_prims(below, depth);
+  close_prims(kept, depth);
   return QMAT_OK;
 }
 
 /* Lists the children that are active medial meshes. */
-static qmat_status list_medials(qmat_usd_below *below, qmat_usd_prim *prim, qmat_usd_beneath *beneath) {
+static qmat_status list_medials(qmat_usd_kept_scene *kept, qmat_usd_prim *prim, qmat_usd_kept_prim *kept_prim) {
   const char *const *names;
   size_t count;
   qmat_status status = qmat_usd_prim_children(prim, &names, &count);
-  const char **medials = status == QMAT_OK ? qmat_arena_alloc(&below->arena, count, sizeof *medials) : NULL;
+  const char **medials = status == QMAT_OK ? qmat_arena_alloc(&kept->arena, count, sizeof *medials) : NULL;
   if (status == QMAT_OK && !medials) status = qmat_usd_fail_prim_memory(prim);
   for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     qmat_usd_prim child;
-    status = qmat_usd_prim_child(below->stage, prim, names[i], &child);
+    status = qmat_usd_prim_child(kept->stage, prim, names[i], &child);
     if (status == QMAT_OK && qmat_usd_prim_is_medial(&child) &&
         qmat_usd_truth(qmat_usd_prim_field(&child, "active"), true))
-      medials[beneath->medial_count++] = names[i];
+      medials[kept_prim->medial_count++] = names[i];
     qmat_usd_prim_uninit(&child);
   }
-  beneath->medials = medials;
+  kept_prim->medials = medials;
   return status;
 }
 
@@ -98,16 +98,16 @@ static const qmat_usd_spec *find_variant(const qmat_usd_prim *prim) {
   return NULL;
 }
 
-qmat_status qmat_usd_below_find(qmat_usd_below *below, const char *path, qmat_usd_beneath *beneath) {
+qmat_status qmat_usd_kept_scene_find(qmat_usd_kept_scene *kept, const char *path, qmat_usd_kept_prim *kept_prim) {
   bool found;
-  *beneath = (qmat_usd_beneath){0};
-  qmat_status status = open_prims(below, path, &found);
+  *kept_prim = (qmat_usd_kept_prim){0};
+  qmat_status status = open_prims(kept, path, &found);
   if (status != QMAT_OK || !found) return status;
-  qmat_usd_prim *prim = &below->prims[below->depth];
+  qmat_usd_prim *prim = &kept->prims[kept->depth];
   status = qmat_progress(prim->log->context, 1, 0, "prims");
   if (status != QMAT_OK) return status;
-  beneath->variant = find_variant(prim);
-  return list_medials(below, prim, beneath);
+  kept_prim->variant = find_variant(prim);
+  return list_medials(kept, prim, kept_prim);
 }
 
 /* Whether a prim in a layer has a name that begins so. */
@@ -123,8 +123,8 @@ static bool has_stem(const qmat_usd_spec *root, const char *stem) {
   return false;
 }
 
-bool qmat_usd_below_has_stem(const qmat_usd_below *below, const char *stem) {
-  const qmat_usd_files *files = qmat_usd_stage_files(below->stage);
+bool qmat_usd_kept_scene_has_stem(const qmat_usd_kept_scene *kept, const char *stem) {
+  const qmat_usd_files *files = qmat_usd_stage_files(kept->stage);
   for (size_t i = 0; i < files->file_count; i++) {
     const char *path;
     const qmat_usd_layer *layer;
