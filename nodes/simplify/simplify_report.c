@@ -85,6 +85,13 @@ static qmat_status name_lost_handles(qmat_context *context, const qmat_medial *u
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }
 
+/* Warns of what the result has more than the solid: no lost handle makes up for it. */
+static int warn_of_more(json_t *root, const char *key, const char *key_of_solid, const char *what) {
+  const size_t count = count_at(root, key), wanted = count_at(root, key_of_solid);
+  if (!json_object_get(root, key) || !json_object_get(root, key_of_solid) || count <= wanted) return 0;
+  return qmat_json_add_warning(root, "the result has more %s than the solid: %zu instead of %zu", what, count, wanted);
+}
+
 qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figures *f, const qmat_medial *unit,
                                  const qmat_surface *surface, double epsilon, double deviation, qmat_report *report) {
   const struct {
@@ -126,6 +133,10 @@ qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figu
   if (f->wanted_spheres > 0 && unit->sphere_count > f->wanted_spheres) bad |= warn_of_spheres(root, f, unit, epsilon);
   if (bad) return qmat_fail_memory(context, "the report");
   const qmat_status status = qmat_topology_report(context, unit, surface, root);
+  if (status == QMAT_OK)
+    bad = warn_of_more(root, "loops", "loops_of_solid", "handles") |
+          warn_of_more(root, "voids", "voids_of_solid", "voids");
+  if (bad) return qmat_fail_memory(context, "the report");
   const double error = fmax(epsilon, fmax(f->surface_to_envelope, f->envelope_to_surface));
   return status == QMAT_OK ? name_lost_handles(context, unit, surface, error, root) : status;
 }

@@ -803,6 +803,13 @@ static qmat_medial *spheres_in_capsule(size_t count, const uint32_t *edges, size
   return sealed_medial_mesh(spheres, count, edges, edge_count, triangles, triangle_count);
 }
 
+/* The only warning, NULL for none. */
+static void must_warn(const result *r, const char *expected) {
+  const json_t *warnings = json_object_get(r->report->root, "warnings");
+  assert_int_equal(json_array_size(warnings), expected ? 1 : 0);
+  if (expected) assert_string_equal(json_string_value(json_array_get(warnings, 0)), expected);
+}
+
 static void test_a_void_that_the_solid_does_not_have_is_opened(void **state) {
   (void)state;
   const pipeline *p = model(SMALL);
@@ -811,6 +818,8 @@ static void test_a_void_that_the_solid_does_not_have_is_opened(void **state) {
   result guarded = simplify_medial(p, closed, "epsilon=8% vertices=4");
   result any = simplify_medial(p, closed, "epsilon=8% vertices=4 topology=free");
   assert_int_equal(pipeline_count(any.report, "voids"), 1);
+  must_warn(&any, "the result has more voids than the solid: 1 instead of 0");
+  must_warn(&guarded, NULL);
   assert_int_equal(guarded.medial->sphere_count, 4);
   assert_int_equal(guarded.medial->triangle_count, 3);
   check_topology(p, &guarded);
@@ -829,6 +838,8 @@ static void test_a_loop_that_the_solid_does_not_have_is_closed(void **state) {
   result guarded = simplify_medial(p, ring, "epsilon=8% vertices=3");
   result any = simplify_medial(p, ring, "epsilon=8% vertices=3 topology=free");
   assert_int_equal(pipeline_count(any.report, "loops"), 1);
+  must_warn(&any, "the result has more handles than the solid: 1 instead of 0");
+  must_warn(&guarded, NULL);
   assert_int_equal(guarded.medial->sphere_count, 3);
   assert_int_equal(guarded.medial->triangle_count, 1);
   check_topology(p, &guarded);
