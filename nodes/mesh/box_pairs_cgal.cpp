@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "nodes/mesh/box_pairs_cgal.h"
 
+#include <CGAL/Box_intersection_d/Box_with_info_d.h>
+#include <CGAL/box_intersection_d.h>
+
 #include <exception>
 #include <new>
 
-#include "nodes/mesh/arrangement_cgal.h"
+#include "nodes/mesh/triangle_pairs_cgal.h"
 
 namespace {
 

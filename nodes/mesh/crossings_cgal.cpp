@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "nodes/mesh/arrangement_cgal.h"
+#include "nodes/mesh/triangle_pairs_cgal.h"
 #include "nodes/mesh/union_mesh_cgal.h"
 
 namespace {
@@ -21,10 +22,14 @@ void find(qmat_context *context, const qmat_shells &shells, uint8_t *crosses) {
   std::vector<uint32_t> triangles;
   for (uint32_t t = 0; t < mesh.triangle_count(); t++)
     if (!mesh.is_flat(t)) triangles.push_back(t);
-  qmat::for_each_box_pair(mesh, triangles, [&](uint32_t a, uint32_t b) {
-    if (mesh.patch(a) != mesh.patch(b) || (crosses[a] && crosses[b])) return;
-    if (share_an_edge(mesh.corners(a), mesh.corners(b)) || !qmat::do_meet(mesh, a, b)) return;
-    crosses[a] = crosses[b] = 1;
+  qmat::choose_box_pairs(mesh, triangles, [&](uint32_t a, uint32_t b) {
+    const bool are_known =
+        __atomic_load_n(&crosses[a], __ATOMIC_RELAXED) && __atomic_load_n(&crosses[b], __ATOMIC_RELAXED);
+    if (mesh.patch(a) != mesh.patch(b) || are_known) return false;
+    if (share_an_edge(mesh.corners(a), mesh.corners(b)) || !qmat::do_meet(mesh, a, b)) return false;
+    __atomic_store_n(&crosses[a], uint8_t{1}, __ATOMIC_RELAXED);
+    __atomic_store_n(&crosses[b], uint8_t{1}, __ATOMIC_RELAXED);
+    return false;
   });
 }
 

@@ -13,6 +13,7 @@
 
 #include "core/geometry/vector.h"
 #include "nodes/mesh/arrangement_cgal.h"
+#include "nodes/mesh/triangle_pairs_cgal.h"
 #include "nodes/mesh/union_mesh_cgal.h"
 #include "nodes/mesh/winding_number_cgal.h"
 
@@ -101,12 +102,12 @@ class Union {
     std::vector<uint32_t> triangles;
     for (uint32_t t = 0; t < mesh_.triangle_count(); t++)
       if (mesh_.has_shell(t) && mesh_.reaches(t) && !mesh_.is_flat(t)) triangles.push_back(t);
-    for_each_box_pair(mesh_, triangles, [&](uint32_t a, uint32_t b) {
-      if (mesh_.patch(a) == mesh_.patch(b) || !do_meet(mesh_, a, b)) return;
-      qmat_sets_join(clusters_, mesh_.shell(a), mesh_.shell(b));
-      activate(a);
-      activate(b);
-    });
+    const auto meet = [&](uint32_t a, uint32_t b) { return mesh_.patch(a) != mesh_.patch(b) && do_meet(mesh_, a, b); };
+    for (const Pair &pair : choose_box_pairs(mesh_, triangles, meet)) {
+      qmat_sets_join(clusters_, mesh_.shell(pair.first), mesh_.shell(pair.second));
+      activate(pair.first);
+      activate(pair.second);
+    }
   }
 
   /* Activates shells that meet no other shell but lie where the winding number of the others is not 0. */
@@ -125,10 +126,11 @@ class Union {
 
   /* All pairs of triangles that meet within a cluster, including pairs within one shell. */
   std::vector<Pair> find_pairs(const std::vector<uint32_t> &triangles) {
-    std::vector<Pair> pairs;
-    for_each_box_pair(mesh_, triangles, [&](uint32_t a, uint32_t b) {
-      if (cluster_of(a) != cluster_of(b) || (mesh_.is_flat(a) && mesh_.is_flat(b))) return;
-      if (mesh_.is_flat(a) || mesh_.is_flat(b) || do_meet(mesh_, a, b)) pairs.emplace_back(a, b);
+    std::vector<uint32_t> clusters(mesh_.triangle_count()); /* to find a leader changes the sets */
+    for (const uint32_t t : triangles) clusters[t] = cluster_of(t);
+    std::vector<Pair> pairs = choose_box_pairs(mesh_, triangles, [&](uint32_t a, uint32_t b) {
+      if (clusters[a] != clusters[b] || (mesh_.is_flat(a) && mesh_.is_flat(b))) return false;
+      return mesh_.is_flat(a) || mesh_.is_flat(b) || do_meet(mesh_, a, b);
     });
     std::sort(pairs.begin(), pairs.end());
     return pairs;

@@ -109,6 +109,10 @@ class UnionMesh {
     return {p[0], p[1], p[2]};
   }
 
+  int threads() const {
+    return qmat_threads(context_);
+  }
+
   /* Disjoint sets in the context's arena. */
   uint32_t *new_sets(size_t count) const {
     uint32_t *sets = qmat_sets_new(context_, count);
