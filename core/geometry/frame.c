@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "core/geometry/vector.h"
+
 qmat_status qmat_frame_of_mesh(qmat_context *context, const qmat_mesh *mesh, qmat_frame *frame) {
   if (mesh->triangle_count == 0) {
     qmat_fail(context, QMAT_ERROR_GEOMETRY, "it has no triangles");
@@ -12,15 +14,15 @@ qmat_status qmat_frame_of_mesh(qmat_context *context, const qmat_mesh *mesh, qma
   for (size_t corner = 0; corner < 3 * mesh->triangle_count; corner++) {
     const double *p = mesh->positions + 3 * (size_t)mesh->triangles[corner];
     for (int axis = 0; axis < 3; axis++) {
-      low[axis] = fmin(low[axis], p[axis]);
-      high[axis] = fmax(high[axis], p[axis]);
+      low[axis] = qmat_smaller(low[axis], p[axis]);
+      high[axis] = qmat_larger(high[axis], p[axis]);
     }
   }
   double largest = 0;
   for (int axis = 0; axis < 3; axis++) {
     /* Halved before adding: the sum of two large coordinates could overflow. */
     frame->centre[axis] = 0.5 * low[axis] + 0.5 * high[axis];
-    largest = fmax(largest, high[axis] - low[axis]);
+    largest = qmat_larger(largest, high[axis] - low[axis]);
   }
   /* Scaled by the largest extent, so that the squares of a tiny model do not underflow. */
   double sum = 0;

@@ -401,7 +401,7 @@ static double farthest_corner(const qmat_surface *surface, size_t begin, size_t 
     for (int corner = 0; corner < 3; corner++) {
       double offset[3];
       qmat_subtract(corner_position(surface, surface->order[i], corner), centre, offset);
-      square = fmax(square, qmat_dot(offset, offset));
+      square = qmat_larger(square, qmat_dot(offset, offset));
     }
   }
   return sqrt(square);
@@ -453,7 +453,7 @@ static void sort_along_curve(qmat_surface *surface, sort_item *items) {
     uint64_t code = 0;
     for (int k = 0; k < 3; k++) {
       const double cell = (centroid[k] + 0.5) * 2097151; /* 2^21 - 1 */
-      code |= spread_bits((uint64_t)fmin(fmax(cell, 0), 2097151)) << k;
+      code |= spread_bits((uint64_t)qmat_smaller(qmat_larger(cell, 0), 2097151)) << k;
     }
     items[i] = (sort_item){code, (uint32_t)i};
   }
@@ -585,8 +585,8 @@ static qmat_status make_surface(qmat_context *context, const qmat_mesh *mesh, bo
   for (size_t corner = 0; corner < 3 * made->solid_count; corner++) {
     const double *p = made->positions + 3 * (size_t)mesh->triangles[corner];
     for (int axis = 0; axis < 3; axis++) {
-      made->low[axis] = fmin(made->low[axis], p[axis]);
-      made->high[axis] = fmax(made->high[axis], p[axis]);
+      made->low[axis] = qmat_smaller(made->low[axis], p[axis]);
+      made->high[axis] = qmat_larger(made->high[axis], p[axis]);
     }
   }
   status = build_scene(context, made);

@@ -342,7 +342,7 @@ static double farthest_corner(const double *const corners[3], const double centr
   for (int i = 0; i < 3; i++) {
     double offset[3];
     qmat_subtract(corners[i], centre, offset);
-    square = fmax(square, qmat_dot(offset, offset));
+    square = qmat_larger(square, qmat_dot(offset, offset));
   }
   return sqrt(square);
 }
@@ -389,11 +389,11 @@ static void fill_layer(const qmat_triangle_blocks *blocks, size_t first, size_t 
     corners_of(blocks, blocks->blocks[t / LANES].triangles[t % LANES], corners);
     for (int i = 0; i < 3; i++) {
       const double height = qmat_dot(corners[i], layer->normal);
-      layer->low = fmin(layer->low, height);
-      layer->high = fmax(layer->high, height);
+      layer->low = qmat_smaller(layer->low, height);
+      layer->high = qmat_larger(layer->high, height);
       for (int k = 0; k < 3; k++) {
-        layer->least[k] = fmin(layer->least[k], corners[i][k]);
-        layer->most[k] = fmax(layer->most[k], corners[i][k]);
+        layer->least[k] = qmat_smaller(layer->least[k], corners[i][k]);
+        layer->most[k] = qmat_larger(layer->most[k], corners[i][k]);
       }
     }
   }
@@ -470,8 +470,8 @@ static int widest_axis(const item *items, size_t count) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t i = 0; i < count; i++)
     for (int k = 0; k < 3; k++) {
-      low[k] = fmin(low[k], items[i].centre[k]);
-      high[k] = fmax(high[k], items[i].centre[k]);
+      low[k] = qmat_smaller(low[k], items[i].centre[k]);
+      high[k] = qmat_larger(high[k], items[i].centre[k]);
     }
   int axis = 0;
   for (int k = 1; k < 3; k++)

@@ -58,8 +58,8 @@ static const box no_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY
 
 static void grow_box(box *b, const double *point) {
   for (int k = 0; k < 3; k++) {
-    b->low[k] = fmin(b->low[k], point[k]);
-    b->high[k] = fmax(b->high[k], point[k]);
+    b->low[k] = qmat_smaller(b->low[k], point[k]);
+    b->high[k] = qmat_larger(b->high[k], point[k]);
   }
 }
 
@@ -73,8 +73,8 @@ static box triangle_box(const unison *mesh, size_t triangle) {
 static bool intersect_boxes(const box *a, const box *b, box *common) {
   bool meet = true;
   for (int k = 0; k < 3; k++) {
-    common->low[k] = fmax(a->low[k], b->low[k]);
-    common->high[k] = fmin(a->high[k], b->high[k]);
+    common->low[k] = qmat_larger(a->low[k], b->low[k]);
+    common->high[k] = qmat_smaller(a->high[k], b->high[k]);
     meet = meet && common->low[k] <= common->high[k];
   }
   return meet;
