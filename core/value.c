@@ -100,8 +100,16 @@ static void free_row(const qmat_value *value, const qmat_value_row *row) {
   qmat_free(pointer);
 }
 
+static void free_kept(qmat_value *value) {
+  for (int i = 0; i < 2; i++) {
+    qmat_kept *kept = atomic_load(&value->kept[i]);
+    if (kept) kept->free(kept);
+  }
+}
+
 void qmat_value_release(qmat_value *value) {
   if (!value || atomic_fetch_sub_explicit(&value->references, 1, memory_order_acq_rel) != 1) return;
+  free_kept(value);
   for (const qmat_value_row *row = qmat_value_rows(value); row->name; row++) {
     if (qmat_row_has_pointer(row)) free_row(value, row);
   }

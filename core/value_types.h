@@ -35,12 +35,19 @@
 typedef enum qmat_value_type { QMAT_VALUE_TYPES(QMAT_ENUMERATOR) QMAT_LIST, QMAT_VALUE_TYPE_COUNT } qmat_value_type;
 #undef QMAT_ENUMERATOR
 
+/* What is made of a sealed value when it is first needed, and freed with it. It never changes. */
+typedef struct qmat_kept {
+  void (*free)(struct qmat_kept *kept);
+} qmat_kept;
+
 /* What all types share. */
 typedef struct qmat_value {
   qmat_value_type type;
   atomic_uint references;
   bool sealed;
   qmat_digest digest; /* of the serialised form; set by qmat_value_seal */
+  /* Of a mesh: its surface with sheets and without (qmat_surface_new); NULL where none was needed yet. */
+  _Atomic(qmat_kept *) kept[2];
 } qmat_value;
 
 /* A file in memory: the main file, or one that it refers to. */

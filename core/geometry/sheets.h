@@ -14,9 +14,11 @@ static inline bool qmat_has_solids(const qmat_mesh *mesh) {
   return mesh->sheet_triangle_count == 0 || qmat_solid_triangle_count(mesh) > 0;
 }
 
-/* The mesh without its sheets. It borrows the arrays; vertices keep their numbers, so some may be unused. */
+/* The mesh without its sheets, unsealed. It borrows the arrays; vertices keep their numbers, so some may be unused. */
 static inline qmat_mesh qmat_mesh_of_solids(const qmat_mesh *mesh) {
   qmat_mesh solids = *mesh;
+  solids.base.sealed = false;
+  solids.base.kept[0] = solids.base.kept[1] = NULL;
   solids.triangle_count = qmat_solid_triangle_count(mesh);
   solids.sheet_triangle_count = solids.flap_triangle_count = 0;
   return solids;

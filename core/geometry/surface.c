@@ -3,6 +3,7 @@
 
 #include <embree3/rtcore.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,6 +33,8 @@ typedef struct winding_node {
 } winding_node;
 
 struct qmat_surface {
+  qmat_kept kept; /* with the mesh */
+  atomic_uint references;
   const qmat_mesh *mesh;
   qmat_mesh solids;   /* the mesh without its sheets; `mesh` may point to it */
   size_t solid_count; /* triangles that bound solids */
@@ -561,11 +564,17 @@ done:
   return status;
 }
 
+static void free_kept(qmat_kept *kept) {
+  qmat_surface_free((qmat_surface *)kept);
+}
+
 static qmat_status make_surface(qmat_context *context, const qmat_mesh *mesh, bool with_sheets,
                                 qmat_surface **surface) {
   *surface = NULL;
   qmat_surface *made = qmat_calloc(1, sizeof *made);
   if (!made) return qmat_fail_memory(context, "a surface");
+  made->kept.free = free_kept;
+  atomic_init(&made->references, 1);
   made->solids = qmat_mesh_of_solids(mesh);
   made->mesh = with_sheets ? mesh : &made->solids;
   made->solid_count = made->solids.triangle_count;
@@ -603,16 +612,36 @@ failed:
   return status;
 }
 
+/* The surface that is kept with a sealed mesh, made by the first call. The nodes of a run need the same one. */
+static qmat_status share_surface(qmat_context *context, const qmat_mesh *mesh, bool with_sheets,
+                                 qmat_surface **surface) {
+  if (!mesh->base.sealed) return make_surface(context, mesh, with_sheets, surface);
+  with_sheets = with_sheets || mesh->sheet_triangle_count == 0;
+  _Atomic(qmat_kept *) *place = &((qmat_mesh *)mesh)->base.kept[with_sheets ? 0 : 1];
+  qmat_kept *kept = atomic_load(place);
+  if (!kept) {
+    const qmat_status status = make_surface(context, mesh, with_sheets, surface);
+    if (status != QMAT_OK || !atomic_compare_exchange_strong(place, &kept, &(*surface)->kept)) return status;
+  } else {
+    *surface = NULL;
+    const qmat_status status = qmat_progress(context, 0, 0, "surface");
+    if (status != QMAT_OK) return status;
+    *surface = (qmat_surface *)kept;
+  }
+  atomic_fetch_add(&(*surface)->references, 1);
+  return QMAT_OK;
+}
+
 qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface) {
-  return make_surface(context, mesh, true, surface);
+  return share_surface(context, mesh, true, surface);
 }
 
 qmat_status qmat_surface_new_of_solids(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface) {
-  return make_surface(context, mesh, false, surface);
+  return share_surface(context, mesh, false, surface);
 }
 
 void qmat_surface_free(qmat_surface *surface) {
-  if (!surface) return;
+  if (!surface || atomic_fetch_sub(&surface->references, 1) != 1) return;
   qmat_triangle_blocks_free(surface->blocks);
   qmat_triangle_blocks_free(surface->sheet_blocks);
   if (surface->scene) rtcReleaseScene(surface->scene);

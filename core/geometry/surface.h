@@ -15,9 +15,9 @@
  * through them. */
 typedef struct qmat_surface qmat_surface;
 
-/* Builds the search structure; free it with qmat_surface_free. On failure (also QMAT_CANCELLED) `*surface` is NULL. The
- * mesh must outlive the surface. Degenerate triangles are allowed. Cost: O(n log n) on all threads, about 150 bytes per
- * triangle. */
+/* Builds the search structure; free it with qmat_surface_free. On failure (also QMAT_CANCELLED) `*surface` is NULL. A
+ * sealed mesh keeps it, and later calls give the same one at no cost. The mesh must outlive the surface. Degenerate
+ * triangles are allowed. Cost: O(n log n) on all threads, about 150 bytes per triangle. */
 qmat_status qmat_surface_new(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface);
 /* The same without the sheets, in the unit frame of the whole mesh; qmat_surface_mesh is then without them too. */
 qmat_status qmat_surface_new_of_solids(qmat_context *context, const qmat_mesh *mesh, qmat_surface **surface);
