@@ -95,32 +95,18 @@ static qmat_status find_ranges(division *d) {
 
 /* ---- what is made ---- */
 
-/* Doubles an array of the arena. */
-static void *grown(division *d, const void *array, size_t count, size_t *room, size_t size) {
-  if (count < *room) return (void *)(uintptr_t)array;
-  *room = *room ? 2 * *room : 256;
-  void *larger = qmat_arena_alloc(&d->context->arena, *room, size);
-  if (larger && count > 0) memcpy(larger, array, count * size);
-  d->failed = d->failed || !larger;
-  return larger;
-}
-
 static uint32_t add_sphere(division *d, const double sphere[4], uint32_t joint) {
+  qmat_arena *arena = &d->context->arena;
   const size_t count = d->made.sphere_count;
-  size_t room = d->sphere_room, of_joints = d->sphere_room, of_before = d->sphere_room;
-  double *spheres = grown(d, d->made.spheres, count, &room, 4 * sizeof *spheres);
-  uint32_t *joints = grown(d, d->joints, count, &of_joints, sizeof *joints);
-  uint32_t *before = grown(d, d->before, count, &of_before, sizeof *before);
+  size_t of_joints = d->sphere_room, of_before = d->sphere_room;
+  d->failed = d->failed || qmat_arena_grow(arena, (void **)&d->joints, &of_joints, count + 1, sizeof *d->joints) ||
+              qmat_arena_grow(arena, (void **)&d->before, &of_before, count + 1, sizeof *d->before) ||
+              qmat_arena_grow(arena, (void **)&d->made.spheres, &d->sphere_room, count + 1, 4 * sizeof(double));
   if (d->failed) return 0;
-  d->made.spheres = spheres;
-  d->joints = joints;
-  d->before = before;
-  d->sphere_room = room;
-  memcpy(&spheres[4 * count], sphere, 4 * sizeof *spheres);
-  joints[count] = joint;
-  before[count] = UINT32_MAX;
-  d->made.sphere_count++;
-  return (uint32_t)count;
+  memcpy(&d->made.spheres[4 * count], sphere, 4 * sizeof *sphere);
+  d->joints[count] = joint;
+  d->before[count] = UINT32_MAX;
+  return (uint32_t)d->made.sphere_count++;
 }
 
 /* The joint's sphere of a primitive's at these weights. One of the given spheres is made once for each joint. */
@@ -143,18 +129,19 @@ static uint32_t sphere_at(division *d, const uint32_t ids[3], int width, const d
 }
 
 static void add_edge(division *d, uint32_t a, uint32_t b) {
-  uint32_t *edges = grown(d, d->made.edges, d->made.edge_count, &d->edge_room, 2 * sizeof *edges);
+  const size_t count = d->made.edge_count;
+  d->failed = d->failed || qmat_arena_grow(&d->context->arena, (void **)&d->made.edges, &d->edge_room, count + 1,
+                                           2 * sizeof(uint32_t));
   if (d->failed || a == b) return;
-  d->made.edges = edges;
-  edges[2 * d->made.edge_count] = a;
-  edges[2 * d->made.edge_count++ + 1] = b;
+  memcpy(&d->made.edges[2 * d->made.edge_count++], (const uint32_t[]){a, b}, 2 * sizeof a);
 }
 
 static void add_triangle(division *d, uint32_t a, uint32_t b, uint32_t c) {
-  uint32_t *rows = grown(d, d->made.triangles, d->made.triangle_count, &d->triangle_room, 3 * sizeof *rows);
+  const size_t count = d->made.triangle_count;
+  d->failed = d->failed || qmat_arena_grow(&d->context->arena, (void **)&d->made.triangles, &d->triangle_room,
+                                           count + 1, 3 * sizeof(uint32_t));
   if (d->failed || a == b || b == c || a == c) return;
-  d->made.triangles = rows;
-  memcpy(&rows[3 * d->made.triangle_count++], (const uint32_t[]){a, b, c}, 3 * sizeof *rows);
+  memcpy(&d->made.triangles[3 * d->made.triangle_count++], (const uint32_t[]){a, b, c}, 3 * sizeof a);
 }
 
 /* ---- parts ---- */

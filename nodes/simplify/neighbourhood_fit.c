@@ -87,15 +87,6 @@ qmat_status qmat_neighbourhood_fit_add(qmat_context *context, qmat_neighbourhood
   return QMAT_OK;
 }
 
-/* Whether this is the first slot of its point with a witness in the neighbourhood. */
-static bool is_first_slot(const qmat_neighbourhood_fit *fit, const qmat_surface_to_envelope *tracker, uint32_t removed,
-                          uint32_t slot) {
-  for (uint32_t s = slot - slot % 3; s < slot; s++)
-    if ((removed != QMAT_NONE && tracker->witnesses[s] == removed) || moving_index(fit, tracker->witnesses[s]) >= 0)
-      return false;
-  return true;
-}
-
 qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourhood_fit *fit,
                                          qmat_surface_to_envelope *tracker, const qmat_complex *complex,
                                          const qmat_collapse *collapse, const double sphere[4],
@@ -127,7 +118,8 @@ qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourho
     size_t k = first;
     for (; k < length && status == QMAT_OK; k += stride) {
       const size_t point = list[k] / 3;
-      if (point < surface_count && is_first_slot(fit, tracker, collapse->removed, list[k]))
+      if (point < surface_count && qmat_surface_to_envelope_is_first(tracker, list[k], fit->vertices, fit->count) &&
+          (first_vertex == 0 || qmat_surface_to_envelope_is_first(tracker, list[k], &collapse->removed, 1)))
         status = qmat_neighbourhood_fit_add(context, fit, &tracker->points[3 * point], QMAT_TARGET_SURFACE,
                                             tracker->limits[point]);
     }
@@ -211,16 +203,13 @@ static void add_target(const qmat_neighbourhood_fit *fit, const qmat_complex *co
   }
 }
 
-/* The weight that keeps the spheres near their places, as a share of the targets' weight. */
-static const double damping = 1e-3;
-
 /* Solves by LDL'; b becomes the solution. */
 static bool solve(equations *e) {
   const int n = e->count;
   double trace = 0;
   for (int i = 0; i < n; i++) trace += e->a[i][i];
   if (!(trace > 0)) return false;
-  for (int i = 0; i < n; i++) e->a[i][i] += damping * trace / n;
+  for (int i = 0; i < n; i++) e->a[i][i] += qmat_fit_damping * trace / n;
   for (int j = 0; j < n; j++) {
     double scaled[VARIABLES];
     for (int k = 0; k < j; k++) scaled[k] = e->a[j][k] * e->a[k][k];
