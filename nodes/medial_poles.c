@@ -9,7 +9,7 @@
 #include "core/geometry/sheets.h"
 #include "core/json_text.h"
 #include "nodes/descriptor/libraries.h"
-#include "nodes/initial/poles.h"
+#include "nodes/initial/pole_labels.h"
 #include "nodes/initial/regular_cgal.h"
 #include "nodes/initial/sample_sites.h"
 

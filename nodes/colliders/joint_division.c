@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A medial mesh divided among joints. */
+#include "nodes/colliders/joint_division.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +9,6 @@
 #include "core/geometry/envelope.h"
 #include "core/geometry/vector.h"
 #include "core/node.h"
-#include "nodes/colliders/joint_points.h"
 
 /* Slabs are cut along lines of so many directions: of equal weights of one sphere, and of equal differences of two. A
  * triangle with so many cuts on both sides has at most 15 corners; there is room for as many on the lines. */
@@ -48,13 +48,12 @@ static double along(const double weights[3], int direction) {
 static void find_foot(const division *d, size_t point) {
   const double *place = &d->points->points[4 * point];
   range *foot = &d->ranges[point];
-  size_t primitive;
+  size_t primitive = 0;
   uint32_t ids[3];
-  qmat_envelope_distance(d->envelope, place, &primitive);
+  double weights[3] = {0};
+  (void)qmat_envelope_foot_within(d->envelope, place, INFINITY, &primitive, ids, weights);
   foot->primitive = (uint32_t)primitive;
   foot->joint = d->points->joints[point];
-  double weights[3] = {0};
-  (void)qmat_envelope_foot_within(d->envelope, place, INFINITY, ids, weights);
   for (int k = 0; k < DIRECTIONS; k++) foot->low[k] = foot->high[k] = along(weights, k);
 }
 

@@ -239,7 +239,7 @@ static qmat_status next_slice(qmat_context *context, size_t first, size_t count,
 /* The distance is INFINITY where none is as near as `limit`. */
 static witness nearest_primitive(const qmat_envelope *envelope, const double *point, double limit) {
   witness w;
-  w.distance = qmat_envelope_foot_within(envelope, point, limit, w.vertices, w.weights);
+  w.distance = qmat_envelope_foot_within(envelope, point, limit, NULL, w.vertices, w.weights);
   return w;
 }
 
