@@ -2,7 +2,14 @@
 #ifndef QMAT_NODES_MEASURE_MEDIAL_TOPOLOGY_H
 #define QMAT_NODES_MEASURE_MEDIAL_TOPOLOGY_H
 
-#include "nodes/measure/topology.h"
+#include "core/value.h"
+
+/* The Betti numbers over Z/2; euler = components - loops + voids. */
+typedef struct qmat_topology {
+  bool known; /* else only the members that the function names are valid */
+  size_t components, loops, voids;
+  int64_t euler;
+} qmat_topology;
 
 /* The medial meshes below need not be sealed. Their edges and triangles are those of qmat_medial_set_simplices: ids
  * rise in each row, the rows rise, and every side of a triangle is one of the edges. */

@@ -8,7 +8,6 @@
 #include "core/geometry/sheets.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
-#include "nodes/measure/medial_topology.h"
 
 /* The distance from a shell of the points that test its sides, in diagonals. */
 static const double beside = 1e-5;

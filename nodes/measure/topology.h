@@ -3,20 +3,13 @@
 #define QMAT_NODES_MEASURE_TOPOLOGY_H
 
 #include "core/geometry/surface.h"
-
-/* The Betti numbers over Z/2; euler = components - loops + voids. */
-typedef struct qmat_topology {
-  bool known; /* else only the members that the function names are valid */
-  size_t components, loops, voids;
-  int64_t euler;
-} qmat_topology;
+#include "nodes/measure/medial_topology.h"
 
 /* Computes the topology of the solid within a closed and oriented surface. Outward shells bound its components, inward
  * shells its voids, and the genus of either counts its loops. Shells that do not separate inside from outside
  * (contained in another, or without volume) are left out; shells that cross count separately. Not known for an open
  * surface, or with an edge of more than two triangles. Sheets count as simplicial complexes of their own, whatever they
- * touch. Linear but for the tests of each
- * shell's sides. QMAT_ERROR_MEMORY. */
+ * touch. Linear but for the tests of each shell's sides. QMAT_ERROR_MEMORY. */
 qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *surface, qmat_topology *topology);
 
 #endif

@@ -2,7 +2,7 @@
 #include "nodes/measure/topology_report.h"
 
 #include "core/json_text.h"
-#include "nodes/measure/medial_topology.h"
+#include "nodes/measure/topology.h"
 
 /* `keys`: Euler characteristic, components, loops, voids. */
 static int set_numbers(json_t *root, const qmat_topology *t, bool has_components, const char *const keys[4]) {

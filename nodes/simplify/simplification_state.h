@@ -5,7 +5,7 @@
 #include <stdatomic.h>
 
 #include "nodes/measure/medial_errors.h"
-#include "nodes/measure/medial_topology.h"
+#include "nodes/measure/topology.h"
 #include "nodes/simplify/copies.h"
 #include "nodes/simplify/simplify_report.h"
 #include "nodes/simplify/simplify_setup.h"

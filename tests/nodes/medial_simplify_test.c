@@ -13,7 +13,7 @@
 #include "core/geometry/medial_build.h"
 #include "core/geometry/surface.h"
 #include "core/geometry/vector.h"
-#include "nodes/measure/medial_topology.h"
+#include "nodes/measure/topology.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"

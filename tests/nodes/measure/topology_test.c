@@ -8,7 +8,6 @@
 
 #include <cmocka.h>
 
-#include "nodes/measure/medial_topology.h"
 #include "nodes/simplify/topology_searches.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
