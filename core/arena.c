@@ -119,16 +119,24 @@ void qmat_free(void *memory) {
   free(memory);
 }
 
-int qmat_grow(void **array, size_t *capacity, size_t needed, size_t size) {
+static int grow(qmat_arena *arena, void **array, size_t *capacity, size_t needed, size_t size) {
   if (needed <= *capacity && *array) return 0;
   size_t wanted = *capacity > SIZE_MAX / 2 ? SIZE_MAX : *capacity * 2;
   if (wanted < needed) wanted = needed;
   if (wanted < 16) wanted = 16;
-  void *grown = qmat_alloc(wanted, size);
+  void *grown = arena ? qmat_arena_alloc(arena, wanted, size) : qmat_alloc(wanted, size);
   if (!grown) return -1;
   if (*array) memcpy(grown, *array, *capacity * size);
-  qmat_free(*array);
+  if (!arena) qmat_free(*array);
   *array = grown;
   *capacity = wanted;
   return 0;
+}
+
+int qmat_grow(void **array, size_t *capacity, size_t needed, size_t size) {
+  return grow(NULL, array, capacity, needed, size);
+}
+
+int qmat_arena_grow(qmat_arena *arena, void **array, size_t *capacity, size_t needed, size_t size) {
+  return grow(arena, array, capacity, needed, size);
 }

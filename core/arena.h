@@ -21,6 +21,11 @@ void *qmat_arena_alloc(qmat_arena *arena, size_t count, size_t size);
 /* The same, cleared to zero bytes. */
 void *qmat_arena_calloc(qmat_arena *arena, size_t count, size_t size);
 
+/* Grows an array of the arena to at least `needed` elements of `size` bytes and keeps its contents; the old array stays
+ * too, until the arena is freed. `*capacity` is in elements and at least doubles. `*array` may be NULL with capacity 0.
+ * Returns 0, or -1 when memory is short, with both unchanged. */
+int qmat_arena_grow(qmat_arena *arena, void **array, size_t *capacity, size_t needed, size_t size);
+
 /* Frees all memory of the arena, which is then empty and usable again. NULL is allowed. */
 void qmat_arena_uninit(qmat_arena *arena);
 

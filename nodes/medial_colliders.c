@@ -10,10 +10,12 @@
 #include "nodes/colliders/hull_merge.h"
 #include "nodes/colliders/hull_outside.h"
 #include "nodes/colliders/inside_fit.h"
+#include "nodes/colliders/joint_division.h"
 #include "nodes/colliders/joint_points.h"
 #include "nodes/colliders/rigid_body.h"
 #include "nodes/colliders/shape_hulls.h"
 #include "nodes/colliders/shape_measures.h"
+#include "nodes/colliders/shape_merge.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/measure/unit_spheres.h"
 

@@ -7,7 +7,6 @@
 #include "core/geometry/medial_build.h"
 #include "core/json_text.h"
 #include "core/node.h"
-#include "core/value_check.h"
 #include "nodes/initial/erosion.h"
 #include "nodes/initial/free_pairs.h"
 #include "nodes/measure/unit_spheres.h"
@@ -30,7 +29,6 @@ static double larger(const erosion *e, double value, double time, uint32_t spher
 /* A triangle is as thick as the fire in its own sheet says, so that a thin sheet on a thick one is thin up to its foot;
  * an edge as its thickest triangle. Sheets of the model stay. */
 static void measure(const erosion *e, const qmat_burn_times *times) {
-  static const uint8_t corners[3][2] = {{0, 1}, {0, 2}, {1, 2}};
   const qmat_medial *m = e->medial;
   for (size_t i = 0; i < m->sphere_count; i++) e->spheres[i] = larger(e, 0, times->spheres[i], (uint32_t)i);
   for (size_t i = 0; i < m->edge_count; i++) e->edges[i] = -1;
@@ -40,8 +38,7 @@ static void measure(const erosion *e, const qmat_burn_times *times) {
     for (size_t k = 0; k < 3; k++) value = larger(e, value, times->corners[3 * i + k], ids[k]);
     e->triangles[i] = value;
     for (size_t k = 0; k < 3; k++) {
-      const uint32_t side[2] = {ids[corners[k][0]], ids[corners[k][1]]};
-      double *edge = &e->edges[qmat_simplex_find(m->edges, m->edge_count, 2, side)];
+      double *edge = &e->edges[times->sides[3 * i + k]];
       *edge = fmax(*edge, value);
     }
   }

@@ -199,8 +199,11 @@ static qmat_status bound_envelope_to_surface(evaluation *e) {
   qmat_status status = QMAT_OK;
   for (int search = 0; search < MOST_SEARCHES && status == QMAT_OK && is_open; search++) {
     qmat_boundary_distance_uninit(&e->boundary);
-    status = qmat_boundary_distance_measure(e->context, e->surface, e->envelope, &e->unit, epsilon, tolerance, true,
-                                            false, (size_t)e->params->samples, &e->boundary);
+    status = qmat_boundary_distance_measure(
+        e->context, e->surface, e->envelope, &e->unit,
+        &(qmat_boundary_request){
+            .epsilon = epsilon, .tolerance = tolerance, .sample_count = (size_t)e->params->samples, .outside = true},
+        &e->boundary);
     const qmat_bounds found = e->boundary.either_side;
     is_open = found.lo < decisive && found.hi > decisive;
     epsilon = decisive;

@@ -9,11 +9,9 @@
 #include "core/geometry/sheets.h"
 #include "core/json_text.h"
 #include "nodes/descriptor/libraries.h"
-#include "nodes/initial/poles.h"
+#include "nodes/initial/pole_labels.h"
 #include "nodes/initial/regular_cgal.h"
 #include "nodes/initial/sample_sites.h"
-
-#define NO_SPHERE UINT32_MAX
 
 typedef struct medial_poles_params {
   double sampling;
@@ -31,7 +29,7 @@ typedef struct power_crust {
   qmat_poles poles;
   qmat_regular_simplices power;
   uint8_t *labels;
-  uint32_t *sphere_of; /* per pole: its medial sphere, or NO_SPHERE */
+  uint32_t *sphere_of; /* per pole: its medial sphere, or QMAT_NONE */
   size_t sphere_count;
 } power_crust;
 
@@ -51,7 +49,7 @@ static qmat_status find_inner_poles(power_crust *p) {
   if (!p->labels || !p->sphere_of) return qmat_fail_memory(context, "the labels of poles");
   status = qmat_poles_label(context, &p->poles, p->power.edges, p->power.edge_count, p->params->propagation, p->labels);
   for (size_t i = 0; status == QMAT_OK && i < p->poles.count; i++)
-    p->sphere_of[i] = p->labels[i] == QMAT_POLE_INSIDE && !p->power.hidden[i] ? (uint32_t)p->sphere_count++ : NO_SPHERE;
+    p->sphere_of[i] = p->labels[i] == QMAT_POLE_INSIDE && !p->power.hidden[i] ? (uint32_t)p->sphere_count++ : QMAT_NONE;
   if (status != QMAT_OK || p->sphere_count > 0) return status;
   qmat_fail(context, QMAT_ERROR_GEOMETRY, "no pole of the %zu samples lies inside the surface", p->sites.count);
   qmat_fail_field(context, p->poles.rejected > 0 ? "sampling" : "samples");
@@ -61,19 +59,6 @@ static qmat_status find_inner_poles(power_crust *p) {
 }
 
 /* --- the medial mesh --------------------------------------------------------------------------------------------- */
-
-/* Renumbers simplices of poles in place and keeps those of inner poles; returns how many. */
-static size_t keep_inner(const power_crust *p, uint32_t *simplices, size_t count, size_t corners) {
-  size_t kept = 0;
-  for (size_t i = 0; i < count; i++) {
-    bool inner = true;
-    for (size_t k = 0; k < corners; k++) inner = inner && p->sphere_of[simplices[corners * i + k]] != NO_SPHERE;
-    if (!inner) continue;
-    for (size_t k = 0; k < corners; k++) simplices[corners * kept + k] = p->sphere_of[simplices[corners * i + k]];
-    kept++;
-  }
-  return kept;
-}
 
 typedef struct {
   uint32_t sphere, sample;
@@ -90,7 +75,7 @@ static qmat_status set_regions(const power_crust *p, qmat_medial *medial) {
   size_t count = 0;
   for (size_t i = 0; i < p->cells.count; i++) {
     const uint32_t pole = p->poles.of_cell[i];
-    if (pole != QMAT_NO_POLE && p->sphere_of[pole] != NO_SPHERE) count += 4;
+    if (pole != QMAT_NO_POLE && p->sphere_of[pole] != QMAT_NONE) count += 4;
   }
   contact *contacts = qmat_arena_alloc(&p->context->arena, count, sizeof *contacts);
   medial->region_offset_count = medial->sphere_count + 1;
@@ -101,7 +86,7 @@ static qmat_status set_regions(const power_crust *p, qmat_medial *medial) {
   count = 0;
   for (size_t i = 0; i < p->cells.count; i++) {
     const uint32_t pole = p->poles.of_cell[i];
-    if (pole == QMAT_NO_POLE || p->sphere_of[pole] == NO_SPHERE) continue;
+    if (pole == QMAT_NO_POLE || p->sphere_of[pole] == QMAT_NONE) continue;
     for (size_t k = 0; k < 4; k++)
       contacts[count++] = (contact){p->sphere_of[pole], p->sites.samples[p->cells.corners[4 * i + k]]};
   }
@@ -120,14 +105,15 @@ static qmat_status make_medial(power_crust *p, qmat_medial *medial) {
   medial->spheres = qmat_alloc(p->sphere_count, 4 * sizeof *medial->spheres);
   if (!medial->spheres) return qmat_fail_memory(p->context, "medial spheres");
   for (size_t i = 0; i < p->poles.count; i++)
-    if (p->sphere_of[i] != NO_SPHERE)
+    if (p->sphere_of[i] != QMAT_NONE)
       memcpy(&medial->spheres[4 * (size_t)p->sphere_of[i]], &p->poles.spheres[4 * i], 4 * sizeof *medial->spheres);
   qmat_frame_spheres_to_model(&p->frame, medial->spheres, medial->sphere_count, medial->spheres);
   qmat_status status = qmat_progress(p->context, 0, 0, "simplices");
   if (status != QMAT_OK) return status;
-  const size_t edges = keep_inner(p, p->power.edges, p->power.edge_count, 2);
-  const size_t triangles = keep_inner(p, p->power.triangles, p->power.triangle_count, 3);
-  status = qmat_medial_set_simplices(p->context, medial, p->power.edges, edges, p->power.triangles, triangles);
+  qmat_regular_simplices *s = &p->power;
+  s->edge_count = qmat_medial_renumber(s->edges, s->edge_count, 2, p->sphere_of, s->edges);
+  s->triangle_count = qmat_medial_renumber(s->triangles, s->triangle_count, 3, p->sphere_of, s->triangles);
+  status = qmat_medial_set_simplices(p->context, medial, s->edges, s->edge_count, s->triangles, s->triangle_count);
   if (status == QMAT_OK) status = qmat_progress(p->context, 0, 0, "regions");
   if (status == QMAT_OK) status = set_regions(p, medial);
   return status == QMAT_OK ? qmat_progress(p->context, 0, 0, "regions") : status;

@@ -119,9 +119,9 @@ static qmat_status find_far_places(refiner *r, double limit, refinement *found) 
   qmat_complex complex;
   qmat_constraint_points places;
   qmat_status status = qmat_complex_init(context, &complex, medial, spheres);
-  if (status == QMAT_OK)
-    status = qmat_surface_places_make(context, &r->solids, r->positions, found->samples, points, medial, &complex,
-                                      r->spacing, QMAT_MOST_CONSTRAINT_POINTS, limit, &places);
+  const qmat_place_request request = {
+      &r->solids, r->positions, found->samples, points, r->spacing, QMAT_MOST_CONSTRAINT_POINTS, limit};
+  if (status == QMAT_OK) status = qmat_surface_places_make(context, &request, medial, &complex, &places);
   qmat_complex_uninit(&complex);
   if (status != QMAT_OK) return status;
   found->far_count = 0;

@@ -9,6 +9,7 @@
 #include "core/json_text.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/initial/ball_union_axis.h"
+#include "nodes/initial/medial_vertices.h"
 #include "nodes/initial/poles.h"
 #include "nodes/initial/sample_sites.h"
 
@@ -23,9 +24,6 @@ typedef struct scale_axis_counts {
   qmat_ball_union_counts axis;
 } scale_axis_counts;
 
-/* Points closer to the surface than this (unit frame) do not count as inside. */
-static const double least_depth = 1e-8;
-
 /* Cuts the balls down to the distance to the surface; those whose centre is outside get the radius 0. */
 static qmat_status inscribe(qmat_context *context, const qmat_surface *surface, double *balls, size_t count) {
   const size_t slice = 512; /* inside tests of an open surface are slow */
@@ -39,7 +37,7 @@ static qmat_status inscribe(qmat_context *context, const qmat_surface *surface, 
       double *ball = &balls[4 * i];
       const bool inside = qmat_surface_inside(surface, ball);
       const double depth = inside ? qmat_surface_distance(surface, ball, ball[3], NULL, NULL) : 0;
-      ball[3] = depth > least_depth ? fmin(depth, ball[3]) : 0;
+      ball[3] = depth > qmat_least_depth ? fmin(depth, ball[3]) : 0;
     }
   }
   return QMAT_OK;

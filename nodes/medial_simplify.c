@@ -114,8 +114,10 @@ static const qmat_param params[] = {
         qmat_simplify_params, on_exceed, exceed_rules, QMAT_EXCEED_SKIP,
         "Skip collapses that would exceed epsilon, stop at the first as in the paper, or raise the threshold up to it"),
     QMAT_COLLAPSE_PARAMS,
-    QMAT_INT(qmat_simplify_params, refits, "passes", 8, 0, 1000,
-             "Passes that fit spheres to the surface when no edge can collapse, to make room for more collapses"),
+    QMAT_INT(
+        qmat_simplify_params, refits, "passes", 8, 0, 1000,
+        "Passes that fit spheres to the surface when no edge can collapse, to make room for more collapses; 0: spheres "
+        "are never fitted or repaired"),
     QMAT_INT(qmat_simplify_params, effort, "starts", 1, 1, 1000,
              "The number of different starts; they run side by side on all threads, and the best result is kept"),
     {0},

@@ -434,13 +434,14 @@ static int foot_on_item(const qmat_envelope *envelope, envelope_item item, const
   return count;
 }
 
-double qmat_envelope_foot_within(const qmat_envelope *envelope, const double point[3], double limit, uint32_t ids[3],
-                                 double weights[3]) {
+double qmat_envelope_foot_within(const qmat_envelope *envelope, const double point[3], double limit, size_t *primitive,
+                                 uint32_t ids[3], double weights[3]) {
   envelope_item nearest;
   const double distance = search(envelope, point, limit, -INFINITY, &nearest);
   if (!(distance < INFINITY)) return distance;
   for (int i = foot_on_item(envelope, nearest, point, weights); i < 3; i++) ids[i] = UINT32_MAX;
   (void)qmat_envelope_primitive(envelope, nearest.primitive, ids);
+  if (primitive) *primitive = nearest.primitive;
   return distance;
 }
 

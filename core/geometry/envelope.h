@@ -59,10 +59,11 @@ double qmat_envelope_bound(const qmat_envelope *envelope, const double point[3],
  * that centre to the point. `primitive` as above. Without primitives `sphere` is unchanged. */
 double qmat_envelope_nearest(const qmat_envelope *envelope, const double point[3], size_t *primitive, double sphere[4]);
 
-/* F(point) when it is at most `limit`, else INFINITY. If it is finite, `ids` receives the spheres of the primitive that
- * attains it, UINT32_MAX after the last, and `weights` those of the medial sphere that attains it, 0 after the last. */
-double qmat_envelope_foot_within(const qmat_envelope *envelope, const double point[3], double limit, uint32_t ids[3],
-                                 double weights[3]);
+/* F(point) when it is at most `limit`, else INFINITY. If it is finite, `primitive` (NULL: not wanted) receives that
+ * which attains it, `ids` its spheres, UINT32_MAX after the last, and `weights` those of the medial sphere that attains
+ * it, 0 after the last. */
+double qmat_envelope_foot_within(const qmat_envelope *envelope, const double point[3], double limit, size_t *primitive,
+                                 uint32_t ids[3], double weights[3]);
 
 /* F(point) when it is at most `limit`, else INFINITY. Cheaper when only near points matter. */
 double qmat_envelope_distance_within(const qmat_envelope *envelope, const double point[3], double limit);

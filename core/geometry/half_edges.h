@@ -13,12 +13,17 @@ typedef struct qmat_half_edges {
   uint32_t *spare; /* count: what sorting has left, for any use */
 } qmat_half_edges;
 
+/* The next one around its triangle. */
+static inline uint32_t qmat_half_edge_next(uint32_t h) {
+  return h % 3 == 2 ? h - 2 : h + 1;
+}
+
 static inline uint32_t qmat_half_edge_start(const qmat_half_edges *e, uint32_t h) {
   return e->triangles[h];
 }
 
 static inline uint32_t qmat_half_edge_end(const qmat_half_edges *e, uint32_t h) {
-  return e->triangles[h % 3 == 2 ? h - 2 : h + 1];
+  return e->triangles[qmat_half_edge_next(h)];
 }
 
 /* The corner of its triangle across from it. */

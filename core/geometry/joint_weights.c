@@ -243,7 +243,7 @@ static void blend_joints(const qmat_envelope *envelope, const qmat_medial *media
   uint32_t ids[3] = {UINT32_MAX, UINT32_MAX, UINT32_MAX}, joints[12];
   double feet[3], weights[12];
   size_t count = 0;
-  (void)qmat_envelope_foot_within(envelope, point, INFINITY, ids, feet);
+  (void)qmat_envelope_foot_within(envelope, point, INFINITY, NULL, ids, feet);
   for (size_t i = 0; i < 3 && ids[i] != UINT32_MAX; i++)
     for (size_t k = 0; k < 4; k++, count++) {
       joints[count] = medial->joints[4 * (size_t)ids[i] + k];

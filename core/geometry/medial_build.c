@@ -6,6 +6,8 @@
 #include "core/value_check.h"
 #include "core/value_table.h"
 
+enum { SIDES_A_REPORT = 3 << 16 };
+
 #define MOST_ROWS ((size_t)1 << 40) /* keeps 3 * count and count * 12 bytes far from overflow */
 
 static void put_ids_in_order(uint32_t *row, size_t width) {
@@ -119,6 +121,36 @@ done:
   qmat_free(new_edges);
   qmat_free(new_triangles);
   return status;
+}
+
+qmat_status qmat_medial_sides(qmat_context *context, const qmat_medial *medial, uint32_t *sides) {
+  for (size_t i = 0; i < 3 * medial->triangle_count; i++) {
+    if (i % SIDES_A_REPORT == SIDES_A_REPORT - 1) {
+      const qmat_status status = qmat_progress(context, i / 3, medial->triangle_count, "triangles");
+      if (status != QMAT_OK) return status;
+    }
+    const uint32_t *row = &medial->triangles[i - i % 3], side[2] = {row[i % 3 == 0], row[i % 3 == 2 ? 1 : 2]};
+    const size_t edge = qmat_simplex_find(medial->edges, medial->edge_count, 2, side);
+    if (edge == SIZE_MAX) {
+      qmat_fail(context, QMAT_ERROR_INTERNAL, "the medial mesh lacks the edge %u %u", side[0], side[1]);
+      return qmat_fail_element(context, "triangle", (int64_t)(i / 3));
+    }
+    sides[i] = (uint32_t)edge;
+  }
+  return QMAT_OK;
+}
+
+size_t qmat_medial_renumber(const uint32_t *rows, size_t count, size_t width, const uint32_t *ids, uint32_t *kept) {
+  size_t kept_count = 0;
+  for (size_t i = 0; i < count; i++) {
+    bool whole = true;
+    for (size_t k = 0; k < width; k++) {
+      kept[width * kept_count + k] = ids[rows[width * i + k]];
+      whole = whole && kept[width * kept_count + k] != QMAT_NONE;
+    }
+    kept_count += whole;
+  }
+  return kept_count;
 }
 
 qmat_medial *qmat_medial_copy(const qmat_medial *medial) {

@@ -2,9 +2,7 @@
 #ifndef QMAT_CORE_GEOMETRY_MEDIAL_COMPLEX_H
 #define QMAT_CORE_GEOMETRY_MEDIAL_COMPLEX_H
 
-#include "core/value.h"
-
-#define QMAT_NONE UINT32_MAX
+#include "core/geometry/medial_build.h"
 
 /* Lists of ids, one per row, that grow within one pool. */
 typedef struct qmat_rows {

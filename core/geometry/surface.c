@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/morton.h"
 #include "core/geometry/sheets.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/triangle_blocks.h"
@@ -232,8 +233,7 @@ static double winding_number(const qmat_surface *surface, const double point[3])
     qmat_subtract(node->centre, point, offset);
     const double square = qmat_dot(offset, offset);
     if (square > DIPOLE_BETA * DIPOLE_BETA * node->radius * node->radius) {
-      winding +=
-          qmat_dot(node->area_vector, offset) / (square * sqrt(square)) * 0.0795774715459476678844; /* 1 / (4 pi) */
+      winding += qmat_dot(node->area_vector, offset) / (square * sqrt(square)) * (1 / (4 * QMAT_PI));
     } else if (index >= surface->leaf_count) {
       size_t begin, end;
       leaf_range(surface, index - surface->leaf_count, &begin, &end);
@@ -377,16 +377,6 @@ static int compare_items(const void *left, const void *right) {
   return a->triangle < b->triangle ? -1 : a->triangle > b->triangle;
 }
 
-/* Spreads the bits of a 21-bit number to every third bit of the result. */
-static uint64_t spread_bits(uint64_t x) {
-  x &= 0x1fffff;
-  x = (x | x << 32) & 0x1f00000000ffff;
-  x = (x | x << 16) & 0x1f0000ff0000ff;
-  x = (x | x << 8) & 0x100f00f00f00f00f;
-  x = (x | x << 4) & 0x10c30c30c30c30c3;
-  return (x | x << 2) & 0x1249249249249249;
-}
-
 static void area_and_centroid(const qmat_surface *surface, uint32_t triangle, double area_vector[3],
                               double centroid[3]) {
   triangle_normal(surface, triangle, area_vector);
@@ -456,7 +446,7 @@ static void sort_along_curve(qmat_surface *surface, sort_item *items) {
     uint64_t code = 0;
     for (int k = 0; k < 3; k++) {
       const double cell = (centroid[k] + 0.5) * 2097151; /* 2^21 - 1 */
-      code |= spread_bits((uint64_t)qmat_smaller(qmat_larger(cell, 0), 2097151)) << k;
+      code |= qmat_spread_bits((uint64_t)qmat_smaller(qmat_larger(cell, 0), 2097151)) << k;
     }
     items[i] = (sort_item){code, (uint32_t)i};
   }

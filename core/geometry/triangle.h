@@ -57,6 +57,11 @@ static inline double qmat_triangle_six_volumes(const double a[3], const double b
   return qmat_dot(p, product);
 }
 
+/* Whether a closed surface encloses more than rounding, by its volume and area. */
+static inline bool qmat_encloses(double volume, double area) {
+  return fabs(volume) > 1e-5 * area * sqrt(area);
+}
+
 /* atan2(*y, *x) is half the solid angle of a triangle abc as seen from a point `from` (3 doubles each): above 0 from
  * the triangle's back, below 0 from its front. `*y` is 0 in its plane. Source: van Oosterom, Strackee 1983. */
 static inline void qmat_triangle_half_angle(const double a[3], const double b[3], const double c[3],

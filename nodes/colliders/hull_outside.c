@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/geometry/convex_polygon.h"
+#include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 
 /* Facets between two looks whether the run is cancelled; the most corners of a triangle that was cut three times. */
@@ -85,19 +86,13 @@ static bool search_around(search *s, double corners[3][3], const double centre[3
 }
 
 static void search_triangle(search *s, double corners[3][3], int halvings) {
-  double centre[3], reach = 0, longest = -1, to_triangle = 0;
-  int a = 0;
+  double centre[3], reach = 0, to_triangle = 0;
   uint32_t nearest;
   for (int k = 0; k < 3; k++) centre[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
   const double distance = qmat_surface_distance(s->solid, centre, INFINITY, NULL, &nearest);
   for (int i = 0; i < 3; i++) {
     reach = fmax(reach, qmat_point_distance(corners[i], centre));
     to_triangle = fmax(to_triangle, qmat_surface_distance_to_triangle(s->solid, corners[i], nearest));
-    const double length = qmat_point_distance(corners[i], corners[(i + 1) % 3]);
-    if (length > longest) {
-      longest = length;
-      a = i;
-    }
   }
   double bound = fmin(to_triangle, distance + reach);
   if (distance > s->found) {
@@ -109,11 +104,8 @@ static void search_triangle(search *s, double corners[3][3], int halvings) {
   const double enough = fmax(s->found + s->slack, s->least);
   if (s->found > s->limit || halvings == 0 || reach <= s->reach || bound <= enough) return;
   if (search_around(s, corners, centre, nearest, enough, halvings)) return;
-  const int b = (a + 1) % 3;
   double low[3][3], high[3][3];
-  memcpy(low, corners, sizeof low);
-  memcpy(high, corners, sizeof high);
-  for (int k = 0; k < 3; k++) low[b][k] = high[a][k] = 0.5 * (corners[a][k] + corners[b][k]);
+  qmat_triangle_halve(corners[0], low[0], high[0]);
   search_triangle(s, low, halvings - 1);
   if (!(s->found > s->limit)) search_triangle(s, high, halvings - 1);
 }

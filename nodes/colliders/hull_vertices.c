@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 
 size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *triangles, size_t triangle_count,
@@ -43,10 +44,9 @@ double qmat_hull_volume(const double *points, const uint32_t *triangles, size_t 
   const double *origin = &points[3 * (size_t)triangles[0]];
   double volume = 0;
   for (size_t i = 0; i < triangle_count; i++) {
-    double corners[3][3], across[3];
-    for (size_t k = 0; k < 3; k++) qmat_subtract(&points[3 * (size_t)triangles[3 * i + k]], origin, corners[k]);
-    qmat_cross(corners[0], corners[1], across);
-    volume += qmat_dot(across, corners[2]) / 6;
+    const double *corners[3];
+    for (size_t k = 0; k < 3; k++) corners[k] = &points[3 * (size_t)triangles[3 * i + k]];
+    volume += qmat_triangle_six_volumes(corners[2], corners[0], corners[1], origin) / 6;
   }
   return volume;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A medial mesh divided among joints. */
+#include "nodes/colliders/joint_division.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +9,6 @@
 #include "core/geometry/envelope.h"
 #include "core/geometry/vector.h"
 #include "core/node.h"
-#include "nodes/colliders/joint_points.h"
 
 /* Slabs are cut along lines of so many directions: of equal weights of one sphere, and of equal differences of two. A
  * triangle with so many cuts on both sides has at most 15 corners; there is room for as many on the lines. */
@@ -48,13 +48,12 @@ static double along(const double weights[3], int direction) {
 static void find_foot(const division *d, size_t point) {
   const double *place = &d->points->points[4 * point];
   range *foot = &d->ranges[point];
-  size_t primitive;
+  size_t primitive = 0;
   uint32_t ids[3];
-  qmat_envelope_distance(d->envelope, place, &primitive);
+  double weights[3] = {0};
+  (void)qmat_envelope_foot_within(d->envelope, place, INFINITY, &primitive, ids, weights);
   foot->primitive = (uint32_t)primitive;
   foot->joint = d->points->joints[point];
-  double weights[3] = {0};
-  (void)qmat_envelope_foot_within(d->envelope, place, INFINITY, ids, weights);
   for (int k = 0; k < DIRECTIONS; k++) foot->low[k] = foot->high[k] = along(weights, k);
 }
 
@@ -95,32 +94,18 @@ static qmat_status find_ranges(division *d) {
 
 /* ---- what is made ---- */
 
-/* Doubles an array of the arena. */
-static void *grown(division *d, const void *array, size_t count, size_t *room, size_t size) {
-  if (count < *room) return (void *)(uintptr_t)array;
-  *room = *room ? 2 * *room : 256;
-  void *larger = qmat_arena_alloc(&d->context->arena, *room, size);
-  if (larger && count > 0) memcpy(larger, array, count * size);
-  d->failed = d->failed || !larger;
-  return larger;
-}
-
 static uint32_t add_sphere(division *d, const double sphere[4], uint32_t joint) {
+  qmat_arena *arena = &d->context->arena;
   const size_t count = d->made.sphere_count;
-  size_t room = d->sphere_room, of_joints = d->sphere_room, of_before = d->sphere_room;
-  double *spheres = grown(d, d->made.spheres, count, &room, 4 * sizeof *spheres);
-  uint32_t *joints = grown(d, d->joints, count, &of_joints, sizeof *joints);
-  uint32_t *before = grown(d, d->before, count, &of_before, sizeof *before);
+  size_t of_joints = d->sphere_room, of_before = d->sphere_room;
+  d->failed = d->failed || qmat_arena_grow(arena, (void **)&d->joints, &of_joints, count + 1, sizeof *d->joints) ||
+              qmat_arena_grow(arena, (void **)&d->before, &of_before, count + 1, sizeof *d->before) ||
+              qmat_arena_grow(arena, (void **)&d->made.spheres, &d->sphere_room, count + 1, 4 * sizeof(double));
   if (d->failed) return 0;
-  d->made.spheres = spheres;
-  d->joints = joints;
-  d->before = before;
-  d->sphere_room = room;
-  memcpy(&spheres[4 * count], sphere, 4 * sizeof *spheres);
-  joints[count] = joint;
-  before[count] = UINT32_MAX;
-  d->made.sphere_count++;
-  return (uint32_t)count;
+  memcpy(&d->made.spheres[4 * count], sphere, 4 * sizeof *sphere);
+  d->joints[count] = joint;
+  d->before[count] = UINT32_MAX;
+  return (uint32_t)d->made.sphere_count++;
 }
 
 /* The joint's sphere of a primitive's at these weights. One of the given spheres is made once for each joint. */
@@ -143,18 +128,19 @@ static uint32_t sphere_at(division *d, const uint32_t ids[3], int width, const d
 }
 
 static void add_edge(division *d, uint32_t a, uint32_t b) {
-  uint32_t *edges = grown(d, d->made.edges, d->made.edge_count, &d->edge_room, 2 * sizeof *edges);
+  const size_t count = d->made.edge_count;
+  d->failed = d->failed || qmat_arena_grow(&d->context->arena, (void **)&d->made.edges, &d->edge_room, count + 1,
+                                           2 * sizeof(uint32_t));
   if (d->failed || a == b) return;
-  d->made.edges = edges;
-  edges[2 * d->made.edge_count] = a;
-  edges[2 * d->made.edge_count++ + 1] = b;
+  memcpy(&d->made.edges[2 * d->made.edge_count++], (const uint32_t[]){a, b}, 2 * sizeof a);
 }
 
 static void add_triangle(division *d, uint32_t a, uint32_t b, uint32_t c) {
-  uint32_t *rows = grown(d, d->made.triangles, d->made.triangle_count, &d->triangle_room, 3 * sizeof *rows);
+  const size_t count = d->made.triangle_count;
+  d->failed = d->failed || qmat_arena_grow(&d->context->arena, (void **)&d->made.triangles, &d->triangle_room,
+                                           count + 1, 3 * sizeof(uint32_t));
   if (d->failed || a == b || b == c || a == c) return;
-  d->made.triangles = rows;
-  memcpy(&rows[3 * d->made.triangle_count++], (const uint32_t[]){a, b, c}, 3 * sizeof *rows);
+  memcpy(&d->made.triangles[3 * d->made.triangle_count++], (const uint32_t[]){a, b, c}, 3 * sizeof a);
 }
 
 /* ---- parts ---- */

@@ -19,14 +19,4 @@ typedef struct qmat_joint_points {
 /* Takes all vertices of triangles, and points between. QMAT_ERROR_MEMORY. One thread. Linear. */
 qmat_status qmat_joint_points_take(qmat_context *context, const qmat_surface *surface, qmat_joint_points *taken);
 
-/* Divides the cones and slabs of a medial mesh, whose spheres are in the unit frame, among joints. Each joint gets the
- * part of a cone or slab where the feet of its points are: spheres between, which the medial mesh has there, too. Parts
- * of neighbouring joints may overlap; on a cone there is no gap between them. A cone or slab without such a foot goes
- * to the joint of the point that is nearest to its middle. No sphere of `divided` has two joints. `*joints` receives
- * those of its spheres. Both are in the context's arena; of `divided` only spheres, edges and triangles are set.
- * QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY for ids out of range. All threads; the result does not depend on their number.
- * Cost: a query of the envelope for each point. */
-qmat_status qmat_joint_points_divide(qmat_context *context, const qmat_joint_points *points, const qmat_medial *unit,
-                                     qmat_medial *divided, uint32_t **joints);
-
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fewer colliders: pairs of shapes become one. */
+#include "nodes/colliders/shape_merge.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "core/geometry/vector.h"
-#include "nodes/colliders/shape_set.h"
 
 /* Up to six spheres of two shapes, and the best shape found for both. */
 typedef struct pair {

@@ -74,36 +74,26 @@ typedef struct builder {
   bool failed;
 } builder;
 
-/* Doubles an array of the arena. */
-static void *grown(builder *b, const void *array, size_t count, size_t *room, size_t size) {
-  if (count < *room) return (void *)(uintptr_t)array;
-  *room = *room ? 2 * *room : 64;
-  void *larger = qmat_arena_alloc(&b->context->arena, *room, size);
-  if (larger && count > 0) memcpy(larger, array, count * size);
-  return larger;
-}
-
 static uint32_t add_sphere(builder *b, const double sphere[4]) {
+  qmat_arena *arena = &b->context->arena;
+  const size_t count = b->set.sphere_count;
   size_t of_joints = b->sphere_room;
-  if (b->has_joints) {
-    b->set.joints = grown(b, b->set.joints, b->set.sphere_count, &of_joints, sizeof *b->set.joints);
-    b->failed = b->failed || !b->set.joints;
-    if (!b->failed) b->set.joints[b->set.sphere_count] = b->joint;
-  }
-  double *spheres = grown(b, b->set.spheres, b->set.sphere_count, &b->sphere_room, 4 * sizeof *spheres);
-  b->failed = b->failed || !spheres;
+  if (b->has_joints)
+    b->failed =
+        b->failed || qmat_arena_grow(arena, (void **)&b->set.joints, &of_joints, count + 1, sizeof *b->set.joints);
+  b->failed = b->failed ||
+              qmat_arena_grow(arena, (void **)&b->set.spheres, &b->sphere_room, count + 1, 4 * sizeof *b->set.spheres);
   if (b->failed) return 0;
-  b->set.spheres = spheres;
-  memcpy(&spheres[4 * b->set.sphere_count], sphere, 4 * sizeof *spheres);
+  if (b->has_joints) b->set.joints[count] = b->joint;
+  memcpy(&b->set.spheres[4 * count], sphere, 4 * sizeof *sphere);
   return (uint32_t)b->set.sphere_count++;
 }
 
 /* Adds a shape; ids in any order, equal ones for fewer spheres. */
 static void add_shape(builder *b, uint32_t x, uint32_t y, uint32_t z) {
-  uint32_t *shapes = grown(b, b->set.shapes, b->set.shape_count, &b->shape_room, 3 * sizeof *shapes);
-  b->failed = b->failed || !shapes;
+  b->failed = b->failed || qmat_arena_grow(&b->context->arena, (void **)&b->set.shapes, &b->shape_room,
+                                           b->set.shape_count + 1, 3 * sizeof *b->set.shapes);
   if (b->failed) return;
-  b->set.shapes = shapes;
   uint32_t ids[3] = {x, y, z};
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++)
@@ -113,7 +103,7 @@ static void add_shape(builder *b, uint32_t x, uint32_t y, uint32_t z) {
         ids[j + 1] = higher;
       }
   if (ids[0] == ids[1] && ids[1] != ids[2]) ids[1] = ids[2];
-  memcpy(&shapes[3 * b->set.shape_count++], ids, sizeof ids);
+  memcpy(&b->set.shapes[3 * b->set.shape_count++], ids, sizeof ids);
 }
 
 static void interpolate(const double *a, const double *b, double t, double sphere[4]) {

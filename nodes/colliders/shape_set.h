@@ -56,12 +56,6 @@ qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, 
  * others, unused spheres. Errors and cost as above. */
 qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set);
 
-/* Joins pairs of shapes, the least growth of volume first, until at most `most` are left, or none has another one
- * of its joint. The shape for both is the hull of some of their spheres; `growth` times what the others leave it by is
- * added to its radii, so that 1 makes it contain both. Errors as above. */
-qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qmat_shape_kind kind, double growth,
-                                 size_t most);
-
 /* The union of the shapes, whose primitives are numbered like them. The caller frees it with qmat_envelope_free. */
 qmat_status qmat_shape_set_envelope(qmat_context *context, const qmat_shape_set *set, qmat_envelope **envelope);
 

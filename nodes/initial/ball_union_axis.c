@@ -9,6 +9,7 @@
 #include "nodes/initial/ball_union_cgal.h"
 #include "nodes/initial/circumsphere.h"
 #include "nodes/initial/medial_vertices.h"
+#include "nodes/initial/sample_sites.h"
 
 /* Corners are rounded to this grid, so that more than three spheres that meet in one point have one corner there. */
 static const double corner_grid = 0x1p32;
@@ -17,7 +18,7 @@ static const double corner_grid = 0x1p32;
 static const double worst_circumcentre = 1e-6;
 
 /* Centres are inside the scaled balls, not far from the unit frame. The box around the corners is farther away. */
-static const double farthest_centre = 1, box_reach = 2.5;
+static const double farthest_centre = 1;
 
 typedef struct {
   double point[3];
@@ -56,8 +57,8 @@ static qmat_status prepare_corners(union_axis *u) {
   const size_t count = u->parts.corner_count;
   rounded_corner *sorted = qmat_arena_alloc(arena, count, sizeof *sorted);
   uint32_t *first = qmat_arena_alloc(arena, count, sizeof *first);
-  u->points = qmat_arena_alloc(arena, count + 8, 3 * sizeof *u->points);
-  u->ball_starts = qmat_arena_calloc(arena, count + 10, sizeof *u->ball_starts);
+  u->points = qmat_arena_alloc(arena, count + QMAT_BOX_CORNERS, 3 * sizeof *u->points);
+  u->ball_starts = qmat_arena_calloc(arena, count + QMAT_BOX_CORNERS + 2, sizeof *u->ball_starts);
   u->ball_ids = qmat_arena_alloc(arena, count, 3 * sizeof *u->ball_ids);
   if (!sorted || !first || !u->points || !u->ball_starts || !u->ball_ids)
     return qmat_fail_memory(u->context, "the corners of balls");
@@ -66,14 +67,14 @@ static qmat_status prepare_corners(union_axis *u) {
     sorted[i / 3].point[i % 3] = u->points[i];
     sorted[i / 3].corner = (uint32_t)(i / 3);
   }
-  for (size_t i = 0; i < 24; i++) u->points[3 * count + i] = (i / 3) >> (i % 3) & 1 ? box_reach : -box_reach;
+  qmat_box_corners(u->points + 3 * count);
   qsort(sorted, count, sizeof *sorted, by_point);
   for (size_t i = 0; i < count; i++) {
     const bool same = i > 0 && memcmp(sorted[i].point, sorted[i - 1].point, sizeof sorted[i].point) == 0;
     first[sorted[i].corner] = same ? first[sorted[i - 1].corner] : sorted[i].corner;
   }
   for (size_t i = 0; i < count; i++) u->ball_starts[first[i] + 2] += 3;
-  for (size_t i = 0; i < count + 8; i++) u->ball_starts[i + 2] += u->ball_starts[i + 1];
+  for (size_t i = 0; i < count + QMAT_BOX_CORNERS; i++) u->ball_starts[i + 2] += u->ball_starts[i + 1];
   for (size_t i = 0; i < count; i++)
     for (size_t k = 0; k < 3; k++) u->ball_ids[u->ball_starts[first[i] + 1]++] = u->parts.corner_balls[3 * i + k];
   return QMAT_OK;
@@ -126,7 +127,8 @@ static qmat_status find_voronoi_part(union_axis *u) {
   qmat_context *context = u->context;
   qmat_dual_complex *d = &u->dual;
   qmat_status status = prepare_corners(u);
-  if (status == QMAT_OK) status = qmat_delaunay_tetrahedra(context, u->points, u->parts.corner_count + 8, &d->cells);
+  if (status == QMAT_OK)
+    status = qmat_delaunay_tetrahedra(context, u->points, u->parts.corner_count + QMAT_BOX_CORNERS, &d->cells);
   if (status != QMAT_OK) return status;
   const size_t count = d->cells.count;
   d->kinds = qmat_arena_alloc(&context->arena, count, sizeof *d->kinds);

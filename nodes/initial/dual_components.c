@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/medial_build.h"
 #include "core/geometry/vector.h"
 #include "nodes/measure/envelope_to_surface.h"
 
@@ -70,17 +71,6 @@ static qmat_status mark_needed(qmat_dual_complex *d, const uint32_t *index, size
   return QMAT_OK;
 }
 
-/* Renumbers the corners of simplices and leaves out those whose first corner is gone; returns how many are kept. */
-static size_t renumber_simplices(uint32_t *simplices, size_t count, size_t corners, const uint32_t *renumbered) {
-  size_t kept = 0;
-  for (size_t i = 0; i < count; i++) {
-    if (renumbered[simplices[corners * i]] == NONE) continue;
-    for (size_t k = 0; k < corners; k++) simplices[corners * kept + k] = renumbered[simplices[corners * i + k]];
-    kept++;
-  }
-  return kept;
-}
-
 static qmat_status drop_specks(qmat_dual_complex *d, qmat_dual_component_counts *counts) {
   qmat_arena *arena = &d->context->arena;
   uint32_t *index = qmat_arena_alloc(arena, d->sphere_count, sizeof *index);
@@ -103,8 +93,8 @@ static qmat_status drop_specks(qmat_dual_complex *d, qmat_dual_component_counts 
     d->sphere_of[cell] = renumbered[d->sphere_of[cell]];
     if (d->sphere_of[cell] == NONE) d->kinds[cell] = QMAT_CELL_DROPPED;
   }
-  d->edge_count = renumber_simplices(d->edges, d->edge_count, 2, renumbered);
-  d->triangle_count = renumber_simplices(d->triangles, d->triangle_count, 3, renumbered);
+  d->edge_count = qmat_medial_renumber(d->edges, d->edge_count, 2, renumbered, d->edges);
+  d->triangle_count = qmat_medial_renumber(d->triangles, d->triangle_count, 3, renumbered, d->triangles);
   d->sphere_count = next;
   return QMAT_OK;
 }

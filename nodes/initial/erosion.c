@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry/medial_build.h"
 #include "core/geometry/vector.h"
-#include "core/value_check.h"
 #include "nodes/initial/item_queue.h"
 
 static const size_t steps_per_report = 65536;
@@ -49,24 +49,6 @@ static size_t end_of(const burning *b, uint32_t edge, uint32_t sphere) {
 }
 
 /* --- sectors ----------------------------------------------------------------------------------------------------- */
-
-static qmat_status find_sides(burning *b) {
-  static const uint8_t opposite[3][2] = {{1, 2}, {0, 2}, {0, 1}};
-  const qmat_medial *m = b->medial;
-  for (size_t i = 0; i < m->triangle_count; i++) {
-    if (i % steps_per_report == 0) {
-      const qmat_status status = qmat_progress(b->context, i, m->triangle_count, "triangles");
-      if (status != QMAT_OK) return status;
-    }
-    for (size_t k = 0; k < 3; k++) {
-      const uint32_t side[2] = {m->triangles[3 * i + opposite[k][0]], m->triangles[3 * i + opposite[k][1]]};
-      const uint32_t edge = (uint32_t)qmat_simplex_find(m->edges, m->edge_count, 2, side);
-      b->sides[3 * i + k] = edge;
-      b->edge_triangles[edge]++;
-    }
-  }
-  return QMAT_OK;
-}
 
 /* Joins the places of two triangles at both ends of an edge that only they have. */
 static qmat_status join_places(burning *b) {
@@ -113,7 +95,8 @@ static qmat_status find_sectors(burning *b) {
   if (!b->sides || !b->edge_triangles || !b->open_places || !b->open_sectors || !b->place_offsets || !b->places ||
       !b->times || !b->arrivals || !b->courses || !b->sphere_times || !b->sectors)
     return qmat_fail_memory(b->context, "the sectors of the medial mesh");
-  qmat_status status = find_sides(b);
+  qmat_status status = qmat_medial_sides(b->context, m, b->sides);
+  for (size_t i = 0; status == QMAT_OK && i < 3 * m->triangle_count; i++) b->edge_triangles[b->sides[i]]++;
   if (status == QMAT_OK) status = join_places(b);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < count; i++) {
@@ -276,6 +259,6 @@ qmat_status qmat_burn(qmat_context *context, const qmat_medial *medial, qmat_bur
   for (size_t i = 0; i < places; i++) all[i] = b.times[b.sectors[i]];
   for (size_t i = 0; i < medial->sphere_count; i++)
     if (b.open_sectors[i] > 0) b.sphere_times[i] = INFINITY;
-  *times = (qmat_burn_times){b.sphere_times, all, all + first_end(&b)};
+  *times = (qmat_burn_times){b.sphere_times, all, b.sides, all + first_end(&b)};
   return QMAT_OK;
 }

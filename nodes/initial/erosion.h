@@ -11,6 +11,7 @@
 typedef struct qmat_burn_times {
   double *spheres; /* per sphere: when all around it is burnt */
   double *corners; /* 3 per triangle: when the fire in its sheet reaches each corner */
+  uint32_t *sides; /* 3 per triangle: the edge opposite each corner */
   double *ends;    /* 2 per edge without triangles: when the fire in it reaches each end; else unset */
 } qmat_burn_times;
 

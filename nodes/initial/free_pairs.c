@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "core/value_check.h"
+#include "core/geometry/medial_build.h"
 #include "nodes/initial/item_queue.h"
 
 static const size_t steps_per_report = 65536;
@@ -20,7 +20,7 @@ typedef struct thinning {
   const qmat_medial *medial;
   const double *edge_measures, *triangle_measures;
   double threshold;
-  uint32_t *sides;         /* 3 per triangle */
+  uint32_t *sides;         /* 3 per triangle: the edge opposite each corner */
   incident *around_edge;   /* triangles */
   incident *around_sphere; /* edges */
   uint8_t *is_queued;      /* per item */
@@ -65,10 +65,10 @@ static void remove_edge(thinning *t, uint32_t edge) {
 
 static void remove_triangle(thinning *t, uint32_t triangle) {
   const uint32_t *sides = &t->sides[3 * (size_t)triangle];
-  size_t free_side = 3;
+  size_t free_side = 3; /* of equal ones the side of the lowest ids */
   for (size_t k = 0; k < 3; k++)
     if (t->around_edge[sides[k]].count == 1 &&
-        (free_side == 3 || t->edge_measures[sides[k]] < t->edge_measures[sides[free_side]]))
+        (free_side == 3 || t->edge_measures[sides[k]] <= t->edge_measures[sides[free_side]]))
       free_side = k;
   t->triangle_gone[triangle] = 1;
   for (size_t k = 0; k < 3; k++) {
@@ -94,7 +94,6 @@ static void remove_item(thinning *t, size_t item) {
 /* --- the whole --------------------------------------------------------------------------------------------------- */
 
 static qmat_status find_incidences(thinning *t) {
-  static const uint8_t corners[3][2] = {{0, 1}, {0, 2}, {1, 2}};
   const qmat_medial *m = t->medial;
   for (size_t e = 0; e < m->edge_count; e++) {
     for (size_t k = 0; k < 2; k++) {
@@ -103,18 +102,11 @@ static qmat_status find_incidences(thinning *t) {
       edges->ids ^= (uint32_t)e;
     }
   }
-  for (size_t i = 0; i < m->triangle_count; i++) {
-    if (i % steps_per_report == 0) {
-      const qmat_status status = qmat_progress(t->context, i, m->triangle_count, "triangles");
-      if (status != QMAT_OK) return status;
-    }
-    for (size_t k = 0; k < 3; k++) {
-      const uint32_t side[2] = {m->triangles[3 * i + corners[k][0]], m->triangles[3 * i + corners[k][1]]};
-      const uint32_t edge = (uint32_t)qmat_simplex_find(m->edges, m->edge_count, 2, side);
-      t->sides[3 * i + k] = edge;
-      t->around_edge[edge].count++;
-      t->around_edge[edge].ids ^= (uint32_t)i;
-    }
+  const qmat_status status = qmat_medial_sides(t->context, m, t->sides);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < 3 * m->triangle_count; i++) {
+    t->around_edge[t->sides[i]].count++;
+    t->around_edge[t->sides[i]].ids ^= (uint32_t)(i / 3);
   }
   return QMAT_OK;
 }

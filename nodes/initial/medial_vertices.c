@@ -31,13 +31,9 @@ void qmat_medial_vertex_incentre(const qmat_dual_complex *d, size_t cell, double
   incentre(p, centre);
 }
 
-/* Points closer to the surface than this (unit frame) do not count as inside. Coplanar samples are coplanar only up to
- * rounding and make flat tetrahedra on the surface, whose side would depend on chance. */
-static const double least_depth = 1e-8;
-
 static bool deep_inside(const qmat_surface *surface, const double *point) {
   return qmat_surface_inside(surface, point) &&
-         !(qmat_surface_distance(surface, point, least_depth, NULL, NULL) <= least_depth);
+         !(qmat_surface_distance(surface, point, qmat_least_depth, NULL, NULL) <= qmat_least_depth);
 }
 
 double qmat_dual_edge_outside(const qmat_dual_complex *d, uint32_t a, uint32_t b, double least, double limit) {
@@ -99,7 +95,7 @@ static qmat_cell_kind select_medial_vertex(const qmat_dual_complex *d, size_t ce
     const double nearest = fmin(qmat_surface_distance(d->surface, sphere, sphere[3], NULL, NULL), sphere[3]);
     /* No surface comes between a circumcentre and an incentre that is nearer than the surface. */
     const bool is_beside = in_solid && qmat_point_distance(sphere, centre) < (1 - 1e-9) * nearest;
-    if (nearest > least_depth && (is_beside || qmat_surface_inside(d->surface, sphere))) {
+    if (nearest > qmat_least_depth && (is_beside || qmat_surface_inside(d->surface, sphere))) {
       if (d->params->radius == QMAT_RADIUS_DISTANCE) sphere[3] = nearest;
       return QMAT_CELL_CIRCUMCENTRE;
     }

@@ -4,6 +4,10 @@
 
 #include "nodes/initial/dual_complex.h"
 
+/* Points closer to the surface than this (unit frame) do not count as inside. Coplanar samples are coplanar only up to
+ * rounding and make flat tetrahedra on the surface, whose side would depend on chance. */
+static const double qmat_least_depth = 1e-8;
+
 /* Algorithm 1: sets `kinds` and `spheres` of every tetrahedron. Reads `points`, `thin`, `cells` and
  * `solids`. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. */
 qmat_status qmat_medial_vertices_select(qmat_dual_complex *dual);

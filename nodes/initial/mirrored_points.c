@@ -160,19 +160,10 @@ static void find_crossings(const mirror *m, size_t sample, crossings *found) {
 
 /* Makes room for one more point. */
 static qmat_status reserve(qmat_context *context, qmat_mirrored_points *mirrored, size_t *room) {
-  if (mirrored->count < *room) return QMAT_OK;
-  const size_t larger = *room > 0 ? 2 * *room : 1024;
-  double *points = qmat_arena_alloc(&context->arena, larger, 3 * sizeof *points);
-  uint32_t *facets = qmat_arena_alloc(&context->arena, larger, sizeof *facets);
-  if (!points || !facets) return qmat_fail_memory(context, "mirrored points");
-  if (*room > 0) {
-    memcpy(points, mirrored->points, 3 * *room * sizeof *points);
-    memcpy(facets, mirrored->facets, *room * sizeof *facets);
-  }
-  mirrored->points = points;
-  mirrored->facets = facets;
-  *room = larger;
-  return QMAT_OK;
+  size_t of_facets = *room, needed = mirrored->count + 1;
+  const int bad = qmat_arena_grow(&context->arena, (void **)&mirrored->facets, &of_facets, needed, sizeof(uint32_t)) ||
+                  qmat_arena_grow(&context->arena, (void **)&mirrored->points, room, needed, 3 * sizeof(double));
+  return bad ? qmat_fail_memory(context, "mirrored points") : QMAT_OK;
 }
 
 /* Adds the crossings of a sample that lie near no sample and no other one of them. */

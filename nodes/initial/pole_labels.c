@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The labels of poles: a priority queue of poles by how certain their label is. */
+#include "nodes/initial/pole_labels.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "core/geometry/vector.h"
 #include "nodes/initial/item_queue.h"
-#include "nodes/initial/poles.h"
 
 /* A pole that another one gives a label to. */
 typedef struct {

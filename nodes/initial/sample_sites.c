@@ -31,13 +31,16 @@ qmat_status qmat_sample_sites_find(qmat_context *context, const qmat_mesh *mesh,
   return QMAT_OK;
 }
 
+void qmat_box_corners(double corners[3 * QMAT_BOX_CORNERS]) {
+  const double reach = 2.5;
+  for (size_t i = 0; i < 3 * QMAT_BOX_CORNERS; i++) corners[i] = (i / 3) >> (i % 3) & 1 ? reach : -reach;
+}
+
 qmat_status qmat_boxed_points(qmat_context *context, const qmat_frame *frame, const qmat_sample_sites *sites,
                               double **points) {
-  const double reach = 2.5;
   *points = qmat_arena_alloc(&context->arena, sites->count + QMAT_BOX_CORNERS, 3 * sizeof **points);
   if (!*points) return qmat_fail_memory(context, "samples");
   qmat_frame_to_unit(frame, sites->points, sites->count, *points);
-  for (size_t i = 0; i < 3 * QMAT_BOX_CORNERS; i++)
-    (*points)[3 * sites->count + i] = (i / 3) >> (i % 3) & 1 ? reach : -reach;
+  qmat_box_corners(*points + 3 * sites->count);
   return QMAT_OK;
 }

@@ -16,9 +16,14 @@ typedef struct qmat_sample_sites {
 qmat_status qmat_sample_sites_find(qmat_context *context, const qmat_mesh *mesh, const qmat_samples *samples,
                                    qmat_sample_sites *sites);
 
-/* The sites in the unit frame, and behind them the corners of a box around them, five times as large as a box with the
- * surface's diagonal as its sides: 3 doubles per point, in the context's arena. QMAT_ERROR_MEMORY. */
 enum { QMAT_BOX_CORNERS = 8 };
+
+/* Sets the corners (3 doubles each) of a box around the unit frame, five times as large as a box with the surface's
+ * diagonal as its sides. */
+void qmat_box_corners(double corners[3 * QMAT_BOX_CORNERS]);
+
+/* The sites in the unit frame, and behind them the corners of that box: 3 doubles per point, in the context's arena.
+ * QMAT_ERROR_MEMORY. */
 qmat_status qmat_boxed_points(qmat_context *context, const qmat_frame *frame, const qmat_sample_sites *sites,
                               double **points);
 

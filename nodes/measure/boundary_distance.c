@@ -357,23 +357,22 @@ static qmat_bounds raised(qmat_bounds b) {
 }
 
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
-                                           const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
-                                           double tolerance, bool outside, bool only_places, size_t sample_count,
-                                           qmat_boundary_distance *result) {
+                                           const qmat_envelope *envelope, const qmat_medial *unit,
+                                           const qmat_boundary_request *request, qmat_boundary_distance *result) {
   *result = (qmat_boundary_distance){.sample_count = 0};
   qmat_boundary_features f;
   qmat_status status = qmat_boundary_features_init(context, unit, &f);
   if (status == QMAT_OK && qmat_boundary_features_count(&f) > UINT32_MAX)
     status = qmat_fail_memory(context, "the envelope's boundary");
-  if (status == QMAT_OK) status = sample_boundary(context, &f, surface, envelope, sample_count, result);
+  if (status == QMAT_OK) status = sample_boundary(context, &f, surface, envelope, request->sample_count, result);
   search s = {.features = &f,
               .surface = surface,
               .envelope = envelope,
-              .epsilon = epsilon,
-              .only_places = only_places,
-              .skin = outside ? certain_skin : QMAT_BOUNDARY_SKIN,
-              .wanted = outside ? WANT_EITHER_SIDE | WANT_OUTSIDE : WANT_EITHER_SIDE};
-  if (status == QMAT_OK) status = search_pieces(context, &s, tolerance, result);
+              .epsilon = request->epsilon,
+              .only_places = request->only_places,
+              .skin = request->outside ? certain_skin : QMAT_BOUNDARY_SKIN,
+              .wanted = request->outside ? WANT_EITHER_SIDE | WANT_OUTSIDE : WANT_EITHER_SIDE};
+  if (status == QMAT_OK) status = search_pieces(context, &s, request->tolerance, result);
   result->either_side = raised(result->either_side);
   result->outside = raised(result->outside);
   return status;

@@ -24,6 +24,15 @@ typedef struct qmat_boundary_distance {
 
 void qmat_boundary_distance_uninit(qmat_boundary_distance *result);
 
+/* What is measured, as below. */
+typedef struct qmat_boundary_request {
+  double epsilon;      /* unit frame, above 0 */
+  double tolerance;    /* a share of epsilon, above 0; their product is taken for 1e-5 at least */
+  size_t sample_count; /* 0: no samples */
+  bool outside;        /* false: the inside tests are left out */
+  bool only_places;    /* the search is for places farther than epsilon */
+} qmat_boundary_request;
+
 /* Measures the distance to the surface over the boundary of the union of the spheres, cones and slabs of `unit` (a
  * sealed medial mesh's arrays in the unit frame, of which `envelope` was made). Both sides of the surface count.
  *
@@ -40,15 +49,12 @@ void qmat_boundary_distance_uninit(qmat_boundary_distance *result);
  * queries reaches its limit, hi is larger; it still is an upper bound.
  *
  * The arrays of places have one point for each piece that was finished so, the farthest among them. Free them with
- * qmat_boundary_distance_uninit, also after a failure. `epsilon` > 0 and `tolerance` > 0; their product is taken for
- * 1e-5 at least. `outside` false skips the inside tests. With `only_places` the search is for places farther than
- * epsilon all over the boundary: a piece with one is not split, and once there is one, no piece is split below a tenth
- * of epsilon. hi is then INFINITY. A search without such a place ends as usual. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All
- * threads. */
+ * qmat_boundary_distance_uninit, also after a failure. With `only_places` the search covers all of the boundary: a
+ * piece with such a place is not split, and once there is one, no piece is split below a tenth of epsilon. hi is then
+ * INFINITY. A search without such a place ends as usual. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads. */
 qmat_status qmat_boundary_distance_measure(qmat_context *context, const qmat_surface *surface,
-                                           const qmat_envelope *envelope, const qmat_medial *unit, double epsilon,
-                                           double tolerance, bool outside, bool only_places, size_t sample_count,
-                                           qmat_boundary_distance *result);
+                                           const qmat_envelope *envelope, const qmat_medial *unit,
+                                           const qmat_boundary_request *request, qmat_boundary_distance *result);
 
 /* The upper bound that a search for the largest of some distances has to prove, with `lo` attained: lo plus the
  * tolerance above, or less where that proves the distance to be at most epsilon. */

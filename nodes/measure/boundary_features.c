@@ -3,10 +3,10 @@
 
 #include <math.h>
 
+#include "core/geometry/medial_build.h"
 #include "core/geometry/medial_distance.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
-#include "core/value_check.h"
 #include "nodes/measure/area_samples.h"
 
 /* Turns counts at [row + 2] into the places where rows are filled. Filling them makes the places offsets. */
@@ -26,23 +26,16 @@ qmat_status qmat_boundary_features_init(qmat_context *context, const qmat_medial
   f->apex_offsets = qmat_arena_calloc(arena, f->edge_count + 2, sizeof *f->apex_offsets);
   f->neighbours = qmat_arena_alloc(arena, f->edge_count, 2 * sizeof *f->neighbours);
   f->apexes = qmat_arena_alloc(arena, f->triangle_count, 3 * sizeof *f->apexes);
-  size_t *sides = qmat_arena_alloc(arena, f->triangle_count, 3 * sizeof *sides);
+  uint32_t *sides = qmat_arena_alloc(arena, f->triangle_count, 3 * sizeof *sides);
   if (!f->neighbour_offsets || !f->apex_offsets || !f->neighbours || !f->apexes || !sides)
     return qmat_fail_memory(context, "the envelope's boundary");
   for (size_t i = 0; i < 2 * f->edge_count; i++) f->neighbour_offsets[f->edges[i] + 2]++;
   sum_counts(f->neighbour_offsets, f->sphere_count);
   for (size_t i = 0; i < 2 * f->edge_count; i++)
     f->neighbours[f->neighbour_offsets[f->edges[i] + 1]++] = f->edges[i ^ 1];
-  for (size_t t = 0; t < f->triangle_count; t++) {
-    const uint32_t *row = &f->triangles[3 * t];
-    for (size_t k = 0; k < 3; k++) { /* side k lies opposite to corner k; corners are in rising order */
-      const uint32_t side[2] = {row[k == 0], row[k == 2 ? 1 : 2]};
-      sides[3 * t + k] = qmat_simplex_find(f->edges, f->edge_count, 2, side);
-      if (sides[3 * t + k] == SIZE_MAX)
-        return qmat_fail(context, QMAT_ERROR_INTERNAL, "a side of medial slab %zu is no edge", t);
-      f->apex_offsets[sides[3 * t + k] + 2]++;
-    }
-  }
+  const qmat_status status = qmat_medial_sides(context, unit, sides);
+  if (status != QMAT_OK) return status;
+  for (size_t i = 0; i < 3 * f->triangle_count; i++) f->apex_offsets[sides[i] + 2]++;
   sum_counts(f->apex_offsets, f->edge_count);
   for (size_t i = 0; i < 3 * f->triangle_count; i++) f->apexes[f->apex_offsets[sides[i] + 1]++] = f->triangles[i];
   return QMAT_OK;

@@ -7,8 +7,6 @@
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 
-static const double half_pi = 1.57079632679489661923;
-
 /* By this the cube of space is larger than the box of the spheres: more than rounding. */
 static const double rounding = 1e-9;
 
@@ -28,8 +26,8 @@ size_t qmat_boundary_pieces_of_feature(const qmat_boundary_features *f, size_t f
       if (!qmat_cone_side_of_edge(f, row, &side)) return 0;
       root.at[1] = 1;
       for (int quarter = 0; quarter < 4; quarter++) {
-        root.at[2] = half_pi * quarter;
-        root.at[3] = half_pi * (quarter + 1);
+        root.at[2] = 0.5 * QMAT_PI * quarter;
+        root.at[3] = 0.5 * QMAT_PI * (quarter + 1);
         pieces[quarter] = root;
       }
       return 4;

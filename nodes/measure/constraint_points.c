@@ -239,7 +239,7 @@ static qmat_status next_slice(qmat_context *context, size_t first, size_t count,
 /* The distance is INFINITY where none is as near as `limit`. */
 static witness nearest_primitive(const qmat_envelope *envelope, const double *point, double limit) {
   witness w;
-  w.distance = qmat_envelope_foot_within(envelope, point, limit, w.vertices, w.weights);
+  w.distance = qmat_envelope_foot_within(envelope, point, limit, NULL, w.vertices, w.weights);
   return w;
 }
 
@@ -418,18 +418,18 @@ static qmat_status find_shell(qmat_context *context, const qmat_surface *surface
   return QMAT_OK;
 }
 
-/* Finds the regions; `unit_samples` are in the unit frame. */
-static qmat_status answering_init(qmat_context *context, const qmat_mesh *mesh, const qmat_samples *samples,
-                                  const double *unit_samples, const qmat_medial *medial, const qmat_complex *complex,
-                                  regions *a) {
-  *a = (regions){.mesh = mesh, .complex = complex};
+/* Finds the regions. */
+static qmat_status answering_init(qmat_context *context, const qmat_place_request *request, const qmat_medial *medial,
+                                  const qmat_complex *complex, regions *a) {
+  *a = (regions){.mesh = request->mesh, .complex = complex};
   if (complex->triangle_count <= most_kept_slabs) {
     a->slabs = qmat_arena_alloc(&context->arena, complex->triangle_count, sizeof *a->slabs);
     a->slab_states = qmat_arena_calloc(&context->arena, complex->triangle_count, sizeof *a->slab_states);
     if (!a->slabs || !a->slab_states) return qmat_fail_memory(context, "medial slabs");
   }
-  const qmat_status status = find_answering(context, samples, medial, a);
-  return status == QMAT_OK ? qmat_point_grid_init(context, unit_samples, samples->count, &a->samples) : status;
+  const qmat_status status = find_answering(context, request->samples, medial, a);
+  if (status != QMAT_OK) return status;
+  return qmat_point_grid_init(context, request->unit_samples, request->samples->count, &a->samples);
 }
 
 /* The points on the surface: the samples, then the points of each facet's grid. */
@@ -438,28 +438,28 @@ typedef struct {
   double *points; /* 3 per point */
 } surface_places;
 
-/* Places them. `spacing` grows until the grids have at most `most` points. */
-static qmat_status place_points(qmat_context *context, const qmat_mesh *mesh, const double *positions,
-                                const qmat_samples *samples, const double *unit_samples, double spacing, size_t most,
-                                surface_places *places) {
+static qmat_status place_points(qmat_context *context, const qmat_place_request *request, surface_places *places) {
+  const qmat_mesh *mesh = request->mesh;
+  const size_t samples = request->samples->count;
+  double spacing = request->spacing;
   size_t added;
   for (;; spacing *= 1.25) {
     const qmat_status status = qmat_progress(context, 0, 0, "constraint points");
     if (status != QMAT_OK) return status;
     added = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-      const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
+      const grid g = grid_of(request->positions, &mesh->triangles[3 * t], spacing);
       added += grid_points(&g);
     }
-    if (added <= most) break;
+    if (added <= request->most) break;
   }
-  places->count = samples->count + added;
+  places->count = samples + added;
   places->points = qmat_arena_alloc(&context->arena, places->count, 3 * sizeof *places->points);
   if (!places->points || places->count >= QMAT_NONE) return qmat_fail_memory(context, "constraint points");
-  memcpy(places->points, unit_samples, 3 * samples->count * sizeof *unit_samples);
-  double *next = places->points + 3 * samples->count;
+  memcpy(places->points, request->unit_samples, 3 * samples * sizeof *places->points);
+  double *next = places->points + 3 * samples;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
-    const grid g = grid_of(positions, &mesh->triangles[3 * t], spacing);
+    const grid g = grid_of(request->positions, &mesh->triangles[3 * t], spacing);
     fill_grid(&g, next);
     next += 3 * grid_points(&g);
   }
@@ -486,20 +486,20 @@ static qmat_status make_surface_points(qmat_context *context, const regions *a, 
   return QMAT_OK;
 }
 
-qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mesh, const double *positions,
-                                     const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
-                                     const qmat_complex *complex, double spacing, size_t most, double enough,
+qmat_status qmat_surface_places_make(qmat_context *context, const qmat_place_request *request,
+                                     const qmat_medial *medial, const qmat_complex *complex,
                                      qmat_constraint_points *constraints) {
-  *constraints = (qmat_constraint_points){.sample_count = samples->count, .sample_point_count = samples->count};
+  const size_t samples = request->samples->count;
+  *constraints = (qmat_constraint_points){.sample_count = samples, .sample_point_count = samples};
   regions a;
   surface_places places;
-  qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
-  if (status == QMAT_OK) status = place_points(context, mesh, positions, samples, unit_samples, spacing, most, &places);
+  qmat_status status = answering_init(context, request, medial, complex, &a);
+  if (status == QMAT_OK) status = place_points(context, request, &places);
   if (status != QMAT_OK) return status;
   constraints->count = constraints->surface_count = places.count;
   status = allocate(context, constraints);
-  if (status == QMAT_OK) status = make_surface_points(context, &a, &places, enough, constraints);
-  return status == QMAT_OK ? search_everywhere(context, &a, enough, constraints) : status;
+  if (status == QMAT_OK) status = make_surface_points(context, &a, &places, request->enough, constraints);
+  return status == QMAT_OK ? search_everywhere(context, &a, request->enough, constraints) : status;
 }
 
 /* Facets much smaller or narrower than epsilon have far more points than its bounds need. Where one point in each cube
@@ -537,7 +537,6 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
                                         const qmat_medial *medial, const qmat_complex *complex, double epsilon,
                                         size_t most, bool inside, qmat_constraint_points *constraints) {
   qmat_arena *arena = &context->arena;
-  const qmat_mesh *mesh = qmat_surface_mesh(surface);
   *constraints = (qmat_constraint_points){.sample_count = samples->count, .sample_point_count = samples->count};
   regions a;
   surface_places places;
@@ -545,13 +544,17 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
   double *unit_samples = qmat_arena_alloc(arena, samples->count, 3 * sizeof *unit_samples);
   if (!unit_samples) return qmat_fail_memory(context, "constraint points");
   qmat_frame_to_unit(qmat_surface_frame(surface), samples->positions, samples->count, unit_samples);
-  qmat_status status = answering_init(context, mesh, samples, unit_samples, medial, complex, &a);
+  const qmat_place_request request = {.mesh = qmat_surface_mesh(surface),
+                                      .positions = qmat_surface_positions(surface),
+                                      .samples = samples,
+                                      .unit_samples = unit_samples,
+                                      .spacing = spacing_share * epsilon,
+                                      .most = most};
+  qmat_status status = answering_init(context, &request, medial, complex, &a);
   if (status == QMAT_OK && inside) status = qmat_interior_points_find(context, complex, epsilon, &inner);
   shell_points shell = {.count = 0};
   if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
-  if (status == QMAT_OK)
-    status = place_points(context, mesh, qmat_surface_positions(surface), samples, unit_samples,
-                          spacing_share * epsilon, most, &places);
+  if (status == QMAT_OK) status = place_points(context, &request, &places);
   if (status != QMAT_OK) return status;
   if (epsilon < INFINITY) status = thin_out(context, epsilon, &places, constraints);
   constraints->surface_count = places.count;

@@ -45,13 +45,22 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
                                         const qmat_medial *medial, const qmat_complex *complex, double epsilon,
                                         size_t most, bool inside, qmat_constraint_points *constraints);
 
-/* Makes the points on the surface only: the samples, and grids of the given spacing with at most `most` points.
- * Distances are upper bounds of F, and F itself where that is above `enough`. `positions` (3 doubles a vertex of the
- * mesh) and `unit_samples` (3 a sample) are in the unit frame, as are all lengths. QMAT_ERROR_MEMORY, QMAT_CANCELLED;
- * QMAT_ERROR_GEOMETRY where the medial mesh belongs to other samples. All threads. */
-qmat_status qmat_surface_places_make(qmat_context *context, const qmat_mesh *mesh, const double *positions,
-                                     const qmat_samples *samples, const double *unit_samples, const qmat_medial *medial,
-                                     const qmat_complex *complex, double spacing, size_t most, double enough,
+/* What points on the surface are wanted; the arrays are the caller's, and all lengths are in the unit frame. */
+typedef struct qmat_place_request {
+  const qmat_mesh *mesh;
+  const double *positions; /* 3 doubles a vertex of the mesh */
+  const qmat_samples *samples;
+  const double *unit_samples; /* their places: 3 doubles each */
+  double spacing;             /* of the grids */
+  size_t most;                /* points of the grids; their spacing grows until they are no more */
+  double enough;              /* distances up to this may be too large */
+} qmat_place_request;
+
+/* Makes the points on the surface only: the samples, and grids. Distances are upper bounds of F, and F itself where
+ * that is above `enough`. QMAT_ERROR_MEMORY, QMAT_CANCELLED; QMAT_ERROR_GEOMETRY where the medial mesh belongs to other
+ * samples. All threads. */
+qmat_status qmat_surface_places_make(qmat_context *context, const qmat_place_request *request,
+                                     const qmat_medial *medial, const qmat_complex *complex,
                                      qmat_constraint_points *constraints);
 
 /* Further points to enforce, found between the others. */

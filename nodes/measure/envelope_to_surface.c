@@ -459,16 +459,16 @@ void qmat_envelope_to_surface_commit(qmat_envelope_to_surface *tracker, const qm
   }
 }
 
-void qmat_envelope_to_surface_bound_edge(qmat_envelope_to_surface *tracker, const qmat_complex *complex, uint32_t a,
-                                         uint32_t b, double bound) {
-  double *known = &tracker->edge_bounds[qmat_complex_find_edge(complex, a, b)];
-  *known = qmat_smaller(*known, bound);
-}
-
-void qmat_envelope_to_surface_bound_triangle(qmat_envelope_to_surface *tracker, const qmat_complex *complex, uint32_t a,
-                                             uint32_t b, uint32_t c, double bound) {
-  double *known = &tracker->triangle_bounds[qmat_complex_find_triangle(complex, a, b, c)];
-  *known = qmat_smaller(*known, bound);
+void qmat_envelope_to_surface_carry(qmat_envelope_to_surface *tracker, const qmat_complex *complex, const uint32_t *ids,
+                                    size_t width, const uint32_t *rows, const uint8_t *alive, const double *bounds,
+                                    size_t count) {
+  for (size_t i = 0; i < count; i++) {
+    if (alive && !alive[i]) continue;
+    const uint32_t *row = &rows[width * i], a = ids[row[0]], b = ids[row[1]];
+    double *known = width == 2 ? &tracker->edge_bounds[qmat_complex_find_edge(complex, a, b)]
+                               : &tracker->triangle_bounds[qmat_complex_find_triangle(complex, a, b, ids[row[2]])];
+    *known = qmat_smaller(*known, bounds[i]);
+  }
 }
 
 static double tightened(const qmat_envelope_to_surface *tracker, const qmat_complex *complex, const uint32_t *vertices,

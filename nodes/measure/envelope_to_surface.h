@@ -58,11 +58,12 @@ qmat_status qmat_envelope_to_surface_test(qmat_context *context, qmat_envelope_t
 /* Accepts the newest successful test. Call it before the complex changes. */
 void qmat_envelope_to_surface_commit(qmat_envelope_to_surface *tracker, const qmat_collapse *collapse);
 
-/* Lowers the bound of h over the live edge (triangle) of these vertices to `bound`. Cost: linear in a star. */
-void qmat_envelope_to_surface_bound_edge(qmat_envelope_to_surface *tracker, const qmat_complex *complex, uint32_t a,
-                                         uint32_t b, double bound);
-void qmat_envelope_to_surface_bound_triangle(qmat_envelope_to_surface *tracker, const qmat_complex *complex, uint32_t a,
-                                             uint32_t b, uint32_t c, double bound);
+/* Carries over bounds of h over `count` rows of `width` vertices (2: edges, 3: triangles), which are live in the
+ * complex by their new numbers `ids`, where they are tighter than those known. `alive`: whether a row counts; NULL: all
+ * do. Cost: rows times a star. */
+void qmat_envelope_to_surface_carry(qmat_envelope_to_surface *tracker, const qmat_complex *complex, const uint32_t *ids,
+                                    size_t width, const uint32_t *rows, const uint8_t *alive, const double *bounds,
+                                    size_t count);
 
 /* Searches the edges and triangles whose bounds exceed the limit for tighter ones. One thread. */
 void qmat_envelope_to_surface_tighten(qmat_envelope_to_surface *tracker, const qmat_complex *complex);

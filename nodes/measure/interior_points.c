@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/morton.h"
 #include "core/geometry/vector.h"
 
 enum { MOST_NODES_ALONG = 128, LAYERS_A_REPORT = 4 };
@@ -80,10 +81,7 @@ static int by_code(const void *left, const void *right) {
 
 /* The bits of three numbers of 21 bits, which follow each other in `cube`, in turns. */
 static uint64_t morton_code(uint64_t cube) {
-  uint64_t code = 0;
-  for (int bit = 0; bit < 21; bit++)
-    for (int k = 0; k < 3; k++) code |= (cube >> (21 * k + bit) & 1) << (3 * bit + k);
-  return code;
+  return qmat_spread_bits(cube) | qmat_spread_bits(cube >> 21) << 1 | qmat_spread_bits(cube >> 42) << 2;
 }
 
 static void enclose(group *g, const double low[3], const double high[3], double largest) {

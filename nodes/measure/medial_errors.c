@@ -100,8 +100,10 @@ qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surfa
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status != QMAT_OK) return status;
   qmat_boundary_distance boundary;
-  status = qmat_boundary_distance_measure(context, surface, envelope, unit, epsilon, boundary_tolerance, false,
-                                          only_places, 0, &boundary);
+  status = qmat_boundary_distance_measure(
+      context, surface, envelope, unit,
+      &(qmat_boundary_request){.epsilon = epsilon, .tolerance = boundary_tolerance, .only_places = only_places},
+      &boundary);
   qmat_envelope_free(envelope);
   errors->boundary_to_surface = boundary.either_side.hi;
   errors->uncovered = boundary.far_points;

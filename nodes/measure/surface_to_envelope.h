@@ -98,4 +98,13 @@ static inline uint32_t qmat_surface_to_envelope_first(const qmat_surface_to_enve
   return tracker->heads[vertex];
 }
 
+/* Whether no earlier slot of the same point has one of `count` vertices as witness. */
+static inline bool qmat_surface_to_envelope_is_first(const qmat_surface_to_envelope *tracker, uint32_t slot,
+                                                     const uint32_t *vertices, int count) {
+  for (uint32_t s = slot - slot % 3; s < slot; s++)
+    for (int i = 0; i < count; i++)
+      if (tracker->witnesses[s] == vertices[i]) return false;
+  return true;
+}
+
 #endif

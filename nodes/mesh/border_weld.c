@@ -9,13 +9,11 @@
 #include "core/geometry/half_edges.h"
 #include "core/geometry/vector.h"
 
-/* A border vertex and its place along a direction that no plane of a model is likely to be perpendicular to. */
+/* A border vertex and its place along qmat_border_direction. */
 typedef struct border_vertex {
   double along;
   uint32_t vertex;
 } border_vertex;
-
-static const double direction[3] = {0.8017, 0.5233, 0.2887};
 
 static int compare(const void *left, const void *right) {
   const border_vertex *a = left, *b = right;
@@ -42,7 +40,7 @@ qmat_status qmat_weld_borders(qmat_context *context, size_t vertex_count, const 
   }
   size_t count = 0;
   for (uint32_t v = 0; v < vertex_count; v++)
-    if (is_border[v]) border[count++] = (border_vertex){qmat_dot(direction, positions + 3 * (size_t)v), v};
+    if (is_border[v]) border[count++] = (border_vertex){qmat_dot(qmat_border_direction, positions + 3 * (size_t)v), v};
   qsort(border, count, sizeof *border, compare);
   for (size_t i = 0; i < count; i++) {
     const double *p = positions + 3 * (size_t)border[i].vertex;

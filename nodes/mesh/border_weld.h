@@ -4,6 +4,9 @@
 
 #include "core/context.h"
 
+/* A direction that no plane of a model is likely to be perpendicular to: borders are sorted along it. */
+static const double qmat_border_direction[3] = {0.8017, 0.5233, 0.2887};
+
 typedef struct qmat_border_weld {
   size_t merged;         /* vertices that are replaced by another; 0: nothing else is set */
   double moved;          /* the largest distance between a vertex and what replaces it */

@@ -13,8 +13,6 @@
 static const double most_seen = 0.2;
 /* A solid with holes has such points on at least this share of its area. */
 static const double least_filled = 0.7;
-/* A part encloses nothing when its volume is less than this share of its area to the power 3/2. */
-static const double least_volume = 1e-5;
 /* Points of a part from which its holes are looked at, and solid angles that are computed for it. */
 enum { MOST_POINTS = 256, FEWEST_POINTS = 16, MOST_ANGLES = 1 << 20 };
 /* Pieces are turned or taken out until nothing is gained, in at most this many rounds. */
@@ -448,7 +446,7 @@ static void judge_part(const division *d, qmat_part *part, const uint32_t *trian
     for (size_t s = 0; s < count; s++) near += fabs(winding[s]) <= most_seen;
     part->filled = count > 0 ? (double)near / (double)count : 0;
   }
-  const bool is_flat = !(fabs(part->volume) > least_volume * part->area * sqrt(part->area));
+  const bool is_flat = !qmat_encloses(part->volume, part->area);
   if (part->loop_count == 0)
     part->kind = is_flat ? QMAT_PART_FLAT : QMAT_PART_CLOSED;
   else

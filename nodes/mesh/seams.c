@@ -8,11 +8,12 @@
 #include "core/geometry/half_edges.h"
 #include "core/geometry/triangle.h"
 #include "nodes/mesh/border_split.h"
+#include "nodes/mesh/border_weld.h"
 
 /* The mean thickness of a solid is at least so many times the width of its seams. */
 static const double least_thickness = 4;
-/* Two directions that no plane of a model is likely to be perpendicular to. */
-static const double along_strips[3] = {0.8017, 0.5233, 0.2887}, across_strips[3] = {0.3119, -0.7331, 0.6043};
+/* A direction like qmat_border_direction. */
+static const double across_strips[3] = {0.3119, -0.7331, 0.6043};
 /* Divisions with ever fewer seams. */
 enum { MOST_ROUNDS = 3 };
 
@@ -72,8 +73,8 @@ static int compare_border_edges(const void *left, const void *right) {
 static border_edge make_border_edge(const seam_finder *s, uint32_t from, uint32_t to, uint32_t triangle) {
   double middle[3];
   for (size_t k = 0; k < 3; k++) middle[k] = (position(s, from)[k] + position(s, to)[k]) / 2;
-  return (border_edge){floor(qmat_dot(across_strips, middle) / s->tolerance), qmat_dot(along_strips, middle), from, to,
-                       triangle};
+  return (border_edge){floor(qmat_dot(across_strips, middle) / s->tolerance), qmat_dot(qmat_border_direction, middle),
+                       from, to, triangle};
 }
 
 static qmat_status find_border(seam_finder *s) {

@@ -9,8 +9,6 @@
 #include "core/geometry/half_edges.h"
 #include "core/geometry/triangle.h"
 
-/* A side encloses nothing when its volume is less than this share of its area to the power 3/2. */
-static const double least_volume = 1e-5;
 /* Triangles of both sides lie in one plane if they leave it by at most this, in diagonals: coordinates of single
  * precision that were rounded. */
 static const double most_apart = 1e-6;
@@ -219,7 +217,7 @@ static bool has_two_sides(side_finder *s, const component *c, uint8_t *second) {
   const side other = collect_side(s, members[i], 2);
   *second = one.order / (double)one.count <= other.order / (double)other.count ? 2 : 1;
   return one.count + other.count == c->count && are_alike(one.volume, -other.volume) &&
-         are_alike(one.area, other.area) && fabs(one.volume) > least_volume * one.area * sqrt(one.area);
+         are_alike(one.area, other.area) && qmat_encloses(one.volume, one.area);
 }
 
 static double turn_of(const double a[2], const double b[2], const double c[2]) {

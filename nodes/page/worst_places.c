@@ -40,8 +40,9 @@ static qmat_status find_on_envelope(qmat_context *context, const qmat_shown *sho
                                     double known, qmat_worst_place *worst) {
   qmat_boundary_distance boundary;
   const double from = fmax(known > 0 ? share * known : 0.5 * shown->range, 10 * least_error);
-  const qmat_status status = qmat_boundary_distance_measure(context, surface, shown->envelope, &shown->unit, from,
-                                                            tolerance, false, false, SAMPLES, &boundary);
+  const qmat_status status = qmat_boundary_distance_measure(
+      context, surface, shown->envelope, &shown->unit,
+      &(qmat_boundary_request){.epsilon = from, .tolerance = tolerance, .sample_count = SAMPLES}, &boundary);
   for (size_t i = 0; status == QMAT_OK && i < boundary.far_count; i++) {
     const double *at = &boundary.far_points[3 * i];
     if (qmat_envelope_holds(shown->envelope, at, rounding)) continue;

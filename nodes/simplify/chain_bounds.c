@@ -36,8 +36,10 @@ static qmat_status bound_level(qmat_context *context, const qmat_surface *surfac
                                                  tolerance * threshold, INFINITY, &errors);
     if (status == QMAT_OK) status = qmat_envelope_of_medial(context, &unit, &envelope);
     if (status == QMAT_OK)
-      status = qmat_boundary_distance_measure(context, surface, envelope, &unit, threshold, tolerance, false, false,
-                                              BOUNDARY_SAMPLES, &boundary);
+      status = qmat_boundary_distance_measure(
+          context, surface, envelope, &unit,
+          &(qmat_boundary_request){.epsilon = threshold, .tolerance = tolerance, .sample_count = BOUNDARY_SAMPLES},
+          &boundary);
   }
   bounds[0] = errors.surface_to_envelope;
   bounds[1] = boundary.either_side.hi;

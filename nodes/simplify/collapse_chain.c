@@ -47,22 +47,6 @@ size_t qmat_chain_length(const qmat_chain *chain, size_t vertices, double epsilo
   return low;
 }
 
-/* Maps simplices to the merged spheres and drops degenerate ones. Returns the number of remaining ones. */
-static size_t map_simplices(const uint32_t *simplices, size_t count, size_t width, const uint32_t *ids,
-                            uint32_t *mapped) {
-  size_t kept = 0;
-  for (size_t i = 0; i < count; i++) {
-    uint32_t *row = &mapped[width * kept];
-    bool whole = true;
-    for (size_t k = 0; k < width; k++) {
-      row[k] = ids[simplices[width * i + k]];
-      for (size_t j = 0; j < k; j++) whole = whole && row[j] != row[k];
-    }
-    kept += whole;
-  }
-  return kept;
-}
-
 qmat_status qmat_chain_extract(qmat_context *context, const qmat_chain *chain, size_t count, qmat_medial *medial) {
   qmat_arena *arena = &context->arena;
   const size_t spheres = chain->sphere_count;
@@ -88,8 +72,8 @@ qmat_status qmat_chain_extract(qmat_context *context, const qmat_chain *chain, s
     const uint32_t kept = chain->ends[2 * i];
     if (roots[kept] == kept) memcpy(&medial->spheres[4 * (size_t)ids[kept]], &chain->merged[4 * i], 4 * sizeof(double));
   }
-  const size_t edge_count = map_simplices(chain->edges, chain->edge_count, 2, ids, edges);
-  const size_t triangle_count = map_simplices(chain->triangles, chain->triangle_count, 3, ids, triangles);
+  const size_t edge_count = qmat_medial_renumber(chain->edges, chain->edge_count, 2, ids, edges);
+  const size_t triangle_count = qmat_medial_renumber(chain->triangles, chain->triangle_count, 3, ids, triangles);
   for (size_t i = 0; i < chain->sample_count; i++)
     owners[i] = chain->owners[i] == QMAT_NONE ? QMAT_NONE : ids[chain->owners[i]];
   const qmat_status status = qmat_medial_set_simplices(context, medial, edges, edge_count, triangles, triangle_count);

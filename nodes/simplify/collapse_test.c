@@ -2,7 +2,6 @@
 #include "nodes/simplify/collapse_test.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Whether the edge is a tubular feature: it has no slab, and all of its responsible region is thin (section 3.4). */

@@ -58,22 +58,6 @@ qmat_status qmat_decimation_extract(const qmat_decimation *s, qmat_medial *media
   return status == QMAT_OK ? set_regions(s, ids, medial) : status;
 }
 
-/* Carries over the bounds of edges and triangles, where they are tighter than those of the corners. */
-static void carry_bounds(const qmat_decimation *from, const uint32_t *ids, qmat_decimation *to) {
-  for (size_t e = 0; e < from->complex.edge_count; e++) {
-    if (!from->complex.edge_alive[e]) continue;
-    const uint32_t *ends = &from->complex.edges[2 * e];
-    qmat_envelope_to_surface_bound_edge(&to->envelope_tracker, &to->complex, ids[ends[0]], ids[ends[1]],
-                                        from->envelope_tracker.edge_bounds[e]);
-  }
-  for (size_t t = 0; t < from->complex.triangle_count; t++) {
-    if (!from->complex.triangle_alive[t]) continue;
-    const uint32_t *corners = &from->complex.triangles[3 * t];
-    qmat_envelope_to_surface_bound_triangle(&to->envelope_tracker, &to->complex, ids[corners[0]], ids[corners[1]],
-                                            ids[corners[2]], from->envelope_tracker.triangle_bounds[t]);
-  }
-}
-
 qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_medial *left, const qmat_extra_points *extra,
                                    qmat_constraint_points *constraints, qmat_decimation *to) {
   qmat_context *context = to->context;
@@ -105,7 +89,11 @@ qmat_status qmat_decimation_resume(const qmat_decimation *from, const qmat_media
   to->newest_inner_count = further.count - further.surface_count;
   if (status == QMAT_OK) status = qmat_decimation_init(to, constraints, depths);
   if (status != QMAT_OK) return status;
-  carry_bounds(from, ids, to);
+  const qmat_envelope_to_surface *known = &from->envelope_tracker;
+  qmat_envelope_to_surface_carry(&to->envelope_tracker, &to->complex, ids, 2, c->edges, c->edge_alive,
+                                 known->edge_bounds, c->edge_count);
+  qmat_envelope_to_surface_carry(&to->envelope_tracker, &to->complex, ids, 3, c->triangles, c->triangle_alive,
+                                 known->triangle_bounds, c->triangle_count);
   if (to->rules.refits > 0 && qmat_decimation_is_two_sided(to))
     qmat_envelope_to_surface_tighten(&to->envelope_tracker, &to->complex);
   to->counts = from->counts;

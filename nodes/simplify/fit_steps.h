@@ -9,6 +9,9 @@
 static const int qmat_fit_powers[] = {0, 4, 6, 8};
 enum { QMAT_FIT_STEPS = sizeof qmat_fit_powers / sizeof *qmat_fit_powers };
 
+/* The weight that keeps spheres near their places, as a share of the points' weight. */
+static const double qmat_fit_damping = 1e-3;
+
 /* The weight of an error in a step, by its share of the largest one before. */
 static inline double qmat_fit_weight(double share, int step) {
   double weight = 1;

@@ -158,8 +158,8 @@ static qmat_status start_fit(qmat_decimation *s, const double sphere[4], bool al
         !qmat_decimation_is_protected(s, c->neighbours[n]))
       others[count++] = c->neighbours[n];
   s->neighbourhood.keeps_radii = qmat_decimation_is_of_sheet(s, c->kept);
-  return qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->surface_tracker, &s->complex, c, sphere,
-                                      others, count, s->constraints->surface_count, s->threshold);
+  const qmat_fit_request request = {sphere, others, count, s->constraints->surface_count, s->threshold};
+  return qmat_neighbourhood_fit_start(s->context, &s->neighbourhood, &s->surface_tracker, &s->complex, c, &request);
 }
 
 /* Fits, places and tests the neighbourhood; the place of a refusal becomes a target of the next fit. If `*result`

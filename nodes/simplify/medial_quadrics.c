@@ -133,9 +133,7 @@ void qmat_medial_quadrics_add_published(const qmat_complex *c, qmat_quadric *qua
   add_slabs(c, quadrics, add_published_rim);
   for (uint32_t e = 0; e < c->edge_count; e++)
     if (!c->edge_triangles[e]) add_published_cone(c, e, quadrics);
-  for (uint32_t v = 0; v < c->vertex_count; v++) {
-    if (c->vertex_edges.counts[v] != 1) continue;
-    const uint32_t edge = c->vertex_edges.items[c->vertex_edges.starts[v]];
-    if (!c->edge_triangles[edge]) add_published_tip(c, v, edge, quadrics);
-  }
+  for (uint32_t v = 0; v < c->vertex_count; v++)
+    if (c->vertex_edges.counts[v] == 1)
+      add_published_tip(c, v, c->vertex_edges.items[c->vertex_edges.starts[v]], quadrics);
 }

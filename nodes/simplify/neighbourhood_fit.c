@@ -87,29 +87,18 @@ qmat_status qmat_neighbourhood_fit_add(qmat_context *context, qmat_neighbourhood
   return QMAT_OK;
 }
 
-/* Whether this is the first slot of its point with a witness in the neighbourhood. */
-static bool is_first_slot(const qmat_neighbourhood_fit *fit, const qmat_surface_to_envelope *tracker, uint32_t removed,
-                          uint32_t slot) {
-  for (uint32_t s = slot - slot % 3; s < slot; s++)
-    if ((removed != QMAT_NONE && tracker->witnesses[s] == removed) || moving_index(fit, tracker->witnesses[s]) >= 0)
-      return false;
-  return true;
-}
-
 qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourhood_fit *fit,
                                          qmat_surface_to_envelope *tracker, const qmat_complex *complex,
-                                         const qmat_collapse *collapse, const double sphere[4],
-                                         const uint32_t *vertices, size_t count, size_t surface_count,
-                                         double threshold) {
-  fit->threshold = threshold;
+                                         const qmat_collapse *collapse, const qmat_fit_request *request) {
+  fit->threshold = request->threshold;
   fit->primitive_count = fit->target_count = 0;
   fit->worst = 0;
   fit->count = 1;
   fit->vertices[0] = collapse->kept;
-  memcpy(fit->spheres[0], sphere, sizeof fit->spheres[0]);
-  for (size_t i = 0; i < count && fit->count < QMAT_NEIGHBOURHOOD_SPHERES; i++) {
-    fit->vertices[fit->count] = vertices[i];
-    memcpy(fit->spheres[fit->count++], &complex->spheres[4 * (size_t)vertices[i]], 4 * sizeof(double));
+  memcpy(fit->spheres[0], request->sphere, sizeof fit->spheres[0]);
+  for (size_t i = 0; i < request->count && fit->count < QMAT_NEIGHBOURHOOD_SPHERES; i++) {
+    fit->vertices[fit->count] = request->vertices[i];
+    memcpy(fit->spheres[fit->count++], &complex->spheres[4 * (size_t)request->vertices[i]], 4 * sizeof(double));
   }
   qmat_status status = QMAT_OK;
   const int first_vertex = collapse->removed == QMAT_NONE ? 0 : -1;
@@ -127,7 +116,9 @@ qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourho
     size_t k = first;
     for (; k < length && status == QMAT_OK; k += stride) {
       const size_t point = list[k] / 3;
-      if (point < surface_count && is_first_slot(fit, tracker, collapse->removed, list[k]))
+      if (point < request->surface_count &&
+          qmat_surface_to_envelope_is_first(tracker, list[k], fit->vertices, fit->count) &&
+          (first_vertex == 0 || qmat_surface_to_envelope_is_first(tracker, list[k], &collapse->removed, 1)))
         status = qmat_neighbourhood_fit_add(context, fit, &tracker->points[3 * point], QMAT_TARGET_SURFACE,
                                             tracker->limits[point]);
     }
@@ -211,16 +202,13 @@ static void add_target(const qmat_neighbourhood_fit *fit, const qmat_complex *co
   }
 }
 
-/* The weight that keeps the spheres near their places, as a share of the targets' weight. */
-static const double damping = 1e-3;
-
 /* Solves by LDL'; b becomes the solution. */
 static bool solve(equations *e) {
   const int n = e->count;
   double trace = 0;
   for (int i = 0; i < n; i++) trace += e->a[i][i];
   if (!(trace > 0)) return false;
-  for (int i = 0; i < n; i++) e->a[i][i] += damping * trace / n;
+  for (int i = 0; i < n; i++) e->a[i][i] += qmat_fit_damping * trace / n;
   for (int j = 0; j < n; j++) {
     double scaled[VARIABLES];
     for (int k = 0; k < j; k++) scaled[k] = e->a[j][k] * e->a[k][k];

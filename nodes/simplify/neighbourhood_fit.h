@@ -25,14 +25,20 @@ typedef struct qmat_neighbourhood_fit {
 
 void qmat_neighbourhood_fit_uninit(qmat_neighbourhood_fit *fit);
 
-/* Starts a fit for `collapse` to `sphere`, and for as many of the `count` other `vertices` as fit in. A few hundred of
- * their constraint points, among the first `surface_count`, become targets, evenly spread over the lists.
- * QMAT_ERROR_MEMORY. */
+/* How a fit starts; the arrays are the caller's. */
+typedef struct qmat_fit_request {
+  const double *sphere;     /* 4 doubles: that of the collapse */
+  const uint32_t *vertices; /* `count` others; as many as fit in are fitted too */
+  size_t count;
+  size_t surface_count; /* constraint points below this number become targets */
+  double threshold;     /* the largest |F| at the surface */
+} qmat_fit_request;
+
+/* Starts a fit for `collapse`. A few hundred of the constraint points of its spheres become targets, evenly spread over
+ * the lists. QMAT_ERROR_MEMORY. */
 qmat_status qmat_neighbourhood_fit_start(qmat_context *context, qmat_neighbourhood_fit *fit,
                                          qmat_surface_to_envelope *tracker, const qmat_complex *complex,
-                                         const qmat_collapse *collapse, const double sphere[4],
-                                         const uint32_t *vertices, size_t count, size_t surface_count,
-                                         double threshold);
+                                         const qmat_collapse *collapse, const qmat_fit_request *request);
 
 /* Adds a target (3 doubles). `limit` is the largest F there; for QMAT_TARGET_BORDER the largest depth, at most
  * `threshold`. QMAT_ERROR_MEMORY. */

@@ -310,25 +310,8 @@ static qmat_status join(const partition *d, const uint32_t *ids, qmat_medial *me
   return qmat_medial_set_simplices(d->context, medial, edges, edge_count, triangles, triangle_count);
 }
 
-/* Carries over the bounds of edges and triangles, where they are tighter than those of the corners. */
-static void carry_bounds(const partition *d, const uint32_t *ids) {
-  qmat_decimation *whole = d->whole;
-  for (size_t p = 0; p < d->piece_count; p++) {
-    const piece_result *result = &d->results[p];
-    for (size_t i = 0; i < result->edge_count; i++) {
-      const uint32_t *ends = &result->edges[2 * i];
-      qmat_envelope_to_surface_bound_edge(&whole->envelope_tracker, &whole->complex, ids[ends[0]], ids[ends[1]],
-                                          result->edge_bounds[i]);
-    }
-    for (size_t i = 0; i < result->triangle_count; i++) {
-      const uint32_t *t = &result->triangles[3 * i];
-      qmat_envelope_to_surface_bound_triangle(&whole->envelope_tracker, &whole->complex, ids[t[0]], ids[t[1]],
-                                              ids[t[2]], result->triangle_bounds[i]);
-    }
-  }
-}
-
-static void add_counts(const partition *d) {
+/* Carries over the counts of the pieces and the bounds of their edges and triangles. */
+static void carry_results(const partition *d, const uint32_t *ids) {
   qmat_decimation *whole = d->whole;
   for (size_t p = 0; p < d->piece_count; p++) {
     const piece_result *result = &d->results[p];
@@ -337,6 +320,10 @@ static void add_counts(const partition *d) {
     whole->counts.refused_by_surface_to_envelope += result->counts.refused_by_surface_to_envelope;
     whole->counts.refused_by_envelope_to_surface += result->counts.refused_by_envelope_to_surface;
     whole->counts.refused_by_topology += result->counts.refused_by_topology;
+    qmat_envelope_to_surface_carry(&whole->envelope_tracker, &whole->complex, ids, 2, result->edges, NULL,
+                                   result->edge_bounds, result->edge_count);
+    qmat_envelope_to_surface_carry(&whole->envelope_tracker, &whole->complex, ids, 3, result->triangles, NULL,
+                                   result->triangle_bounds, result->triangle_count);
   }
 }
 
@@ -373,8 +360,7 @@ static qmat_status join_pieces(partition *d) {
   qmat_value_release(&medial->base);
   if (status == QMAT_OK) status = qmat_decimation_init(whole, d->constraints, d->depths);
   if (status != QMAT_OK) return status;
-  carry_bounds(d, ids);
-  add_counts(d);
+  carry_results(d, ids);
   return QMAT_OK;
 }
 

@@ -76,14 +76,17 @@ qmat_status qmat_simplify_prepare(qmat_context *context, const qmat_simplify_par
   double *spheres;
   if (status == QMAT_OK) status = qmat_unit_spheres(context, qmat_surface_frame(*surface), medial, &spheres);
   if (status != QMAT_OK) return status;
-  double *values = qmat_arena_alloc(&context->arena, samples->count, sizeof *values);
   double *depths = qmat_arena_alloc(&context->arena, medial->sphere_count, sizeof *depths);
-  uint8_t *thin = qmat_arena_alloc(&context->arena, samples->count, sizeof *thin);
-  if (!depths || !values || !thin) return qmat_fail_memory(context, "the medial mesh");
-  qmat_thickness_of_samples(mesh, thickness, samples, values);
-  const double theta = qmat_thickness_threshold(mesh, thickness, params->theta);
-  for (size_t i = 0; i < samples->count; i++) thin[i] = values[i] <= theta;
-  *initial = (qmat_initial_medial){medial->sphere_count, spheres, depths, thin};
+  if (!depths) return qmat_fail_memory(context, "the medial mesh");
+  *initial = (qmat_initial_medial){medial->sphere_count, spheres, depths, NULL};
+  if (params->protect != QMAT_PROTECT_OFF) {
+    double *values = qmat_arena_alloc(&context->arena, samples->count, sizeof *values);
+    initial->thin = qmat_arena_alloc(&context->arena, samples->count, sizeof *initial->thin);
+    if (!values || !initial->thin) return qmat_fail_memory(context, "thin features");
+    qmat_thickness_of_samples(mesh, thickness, samples, values);
+    const double theta = qmat_thickness_threshold(mesh, thickness, params->theta);
+    for (size_t i = 0; i < samples->count; i++) initial->thin[i] = values[i] <= theta;
+  }
   return measure_depths(context, *surface, spheres, medial->sphere_count, depths);
 }
 

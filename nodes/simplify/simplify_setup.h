@@ -12,16 +12,22 @@ typedef enum { QMAT_COMPAT_OFF, QMAT_COMPAT_QMAT } qmat_compatibility;
 /* The parameters of medial.simplify. medial.chain has those that affect which collapses are done or their order; the
  * others are 0 there. */
 typedef struct qmat_simplify_params {
-  double epsilon; /* 0: no bound */
-  int64_t vertices;
-  double most_cost;
-  int cost, compat; /* a qmat_cost_kind, a qmat_compatibility */
-  int error, on_exceed, topology, protect, features;
-  double finest;
-  double crease;
-  double theta;
-  double k;
-  int64_t refits, effort;
+  double epsilon;   /* in diagonals; 0: no bound */
+  int64_t vertices; /* 0: no such stop */
+  double most_cost; /* 0: no limit */
+  int cost;         /* a qmat_cost_kind */
+  int compat;       /* a qmat_compatibility */
+  int error;        /* a qmat_error_kind */
+  int on_exceed;    /* a qmat_exceed_rule */
+  int topology;     /* a qmat_topology_policy */
+  int protect;      /* a qmat_protection */
+  int features;     /* a qmat_feature_rule */
+  double finest;    /* in diagonals, as epsilon */
+  double crease;    /* a share of the threshold */
+  double theta;     /* in mean thicknesses */
+  double k;         /* of eq. 6 */
+  int64_t refits;   /* passes; 0: spheres are never fitted or repaired */
+  int64_t effort;   /* starts */
 } qmat_simplify_params;
 
 extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *const qmat_compat_choices[],
@@ -49,8 +55,10 @@ extern const char *const qmat_error_choices[], *const qmat_cost_choices[], *cons
                 "free: any collapse is allowed, as in the paper. guard: collapses are free, then the components, "    \
                 "loops and voids of the result are corrected to those of the solid; the same as free where the "      \
                 "threshold rises. preserve: every collapse keeps the homotopy type of the initial medial mesh"),      \
-      QMAT_ENUM(qmat_simplify_params, protect, qmat_protect_choices, QMAT_PROTECT_OFF,                                \
-                "Keep thin tubular features at any cost: never, at the late stage, or from the start"),               \
+      QMAT_ENUM(                                                                                                      \
+          qmat_simplify_params, protect, qmat_protect_choices, QMAT_PROTECT_OFF,                                      \
+          "Keep thin tubular features at any cost: never, at the late stage, or from the start. While it is off, "    \
+          "theta and the thickness have no effect"),                                                                  \
       QMAT_ENUM(                                                                                                      \
           qmat_simplify_params, features, qmat_feature_choices, QMAT_FEATURES_SHARP,                                  \
           "Spheres of radius zero, as medial.features makes them, collapse like others, or stay on their creases. "   \
@@ -72,7 +80,7 @@ typedef struct qmat_initial_medial {
   size_t count;    /* of spheres */
   double *spheres; /* 4 per sphere */
   double *depths;  /* per sphere: of its centre, negative outside */
-  uint8_t *thin;   /* per sample: whether it lies on a thin feature */
+  uint8_t *thin;   /* per sample: whether it lies on a thin feature; NULL without protection */
 } qmat_initial_medial;
 
 /* Subtracts the mesh's deviation, `*deviation` in diagonals, from `params->epsilon`. QMAT_ERROR_GEOMETRY if

@@ -15,13 +15,6 @@ void qmat_sphere_fit_uninit(qmat_sphere_fit *fit) {
   *fit = (qmat_sphere_fit){0};
 }
 
-/* Whether this is the first slot of its point with an end of the edge as witness. */
-static bool is_first_slot(const qmat_surface_to_envelope *tracker, const qmat_collapse *collapse, uint32_t slot) {
-  for (uint32_t s = slot - slot % 3; s < slot; s++)
-    if (tracker->witnesses[s] == collapse->kept || tracker->witnesses[s] == collapse->removed) return false;
-  return true;
-}
-
 qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, qmat_surface_to_envelope *tracker,
                                    const qmat_collapse *collapse, size_t surface_count, size_t most) {
   if (qmat_grow((void **)&fit->points, &fit->capacity, most, sizeof *fit->points) ||
@@ -39,7 +32,7 @@ qmat_status qmat_sphere_fit_gather(qmat_context *context, qmat_sphere_fit *fit, 
     if (status != QMAT_OK) return status;
     size_t i = first;
     for (; i < count; i += stride)
-      if (list[i] / 3 < surface_count && is_first_slot(tracker, collapse, list[i]))
+      if (list[i] / 3 < surface_count && qmat_surface_to_envelope_is_first(tracker, list[i], ends, 2))
         fit->points[fit->count++] = list[i] / 3;
     first = i - count;
   }
@@ -77,11 +70,8 @@ static void add_residual(qmat_quadric *sum, const double *point, const double *f
   qmat_quadric_add_plane(sum, n, tangent, weight * share * share);
 }
 
-/* The weight that keeps the sphere near its place, as a share of the points' weight. */
-static const double damping = 1e-3;
-
 static void add_damping(qmat_quadric *sum, const double *sphere) {
-  const double weight = damping * (sum->a[0] + sum->a[4] + sum->a[7]) / 3;
+  const double weight = qmat_fit_damping * (sum->a[0] + sum->a[4] + sum->a[7]) / 3;
   static const int diagonal[4] = {0, 4, 7, 9};
   for (int k = 0; k < 4; k++) {
     sum->a[diagonal[k]] += weight;

@@ -28,32 +28,21 @@ static bool chooses_features(const qmat_simplification *s, const qmat_simplify_p
   return false;
 }
 
-/* Moves the simplices of `width` ids whose ids are all below `limit` to the front. Returns their number. */
-static size_t keep_below(uint32_t *rows, size_t count, size_t width, size_t limit) {
-  size_t kept = 0;
-  for (size_t i = 0; i < count; i++) {
-    bool is_below = true;
-    for (size_t k = 0; k < width; k++) is_below = is_below && rows[width * i + k] < limit;
-    if (!is_below) continue;
-    for (size_t k = 0; k < width; k++) rows[width * kept + k] = rows[width * i + k];
-    kept++;
-  }
-  return kept;
-}
-
 /* Makes a copy of a medial mesh without the spheres that medial.features has added. A medial mesh of nothing else stays
  * whole. */
 static qmat_status leave_features(qmat_context *context, const qmat_medial *medial, qmat_medial **bare) {
   qmat_medial *copy = *bare = qmat_medial_copy(medial);
-  if (!copy) return qmat_fail_memory(context, "the initial medial mesh");
+  uint32_t *ids = qmat_arena_alloc(&context->arena, medial->sphere_count, sizeof *ids);
+  if (!copy || !ids) return qmat_fail_memory(context, "the initial medial mesh");
   const size_t count = qmat_medial_count_without_creases(copy);
   if (count > 0) copy->sphere_count = count;
   if (copy->region_offset_count > 0) {
     copy->region_offset_count = copy->sphere_count + 1;
     copy->region_sample_count = copy->region_offsets[copy->sphere_count];
   }
-  copy->edge_count = keep_below(copy->edges, copy->edge_count, 2, copy->sphere_count);
-  copy->triangle_count = keep_below(copy->triangles, copy->triangle_count, 3, copy->sphere_count);
+  for (uint32_t v = 0; v < medial->sphere_count; v++) ids[v] = v < copy->sphere_count ? v : QMAT_NONE;
+  copy->edge_count = qmat_medial_renumber(copy->edges, copy->edge_count, 2, ids, copy->edges);
+  copy->triangle_count = qmat_medial_renumber(copy->triangles, copy->triangle_count, 3, ids, copy->triangles);
   return QMAT_OK;
 }
 

@@ -42,7 +42,7 @@ enum {
   QMAT_MOST_REFIT_TRIES = 6,   /* of one joint refit, each with the points found in the one before */
   QMAT_MOST_REFITS = 4,        /* joint refits after each other, while each removes spheres */
   QMAT_MOST_FILLINGS = 6,      /* of cavities: filling one can expose another */
-  QMAT_MOST_WALLS = 12,        /* tried per void; of slabs and of edges, per loop */
+  QMAT_MOST_WALLS = 12,        /* slabs and edges tried with each share, for a void or loop */
   QMAT_MOST_FITS = 6,          /* of a neighbourhood, each with the newest failure as a target */
   QMAT_MOST_MOVE_FITS = 16,    /* the same where spheres only move, to repair a place beyond epsilon */
   QMAT_MOST_FAILED_REPAIRS = 3 /* of places within epsilon of each other */

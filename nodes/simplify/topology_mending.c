@@ -6,6 +6,7 @@
 
 #include "core/geometry/medial_build.h"
 #include "nodes/measure/envelope_to_surface.h"
+#include "nodes/simplify/topology_searches.h"
 
 /* Parts of an edge or a triangle that are removed, in the order in which they are tried. 0: all of it. Smaller parts
  * need a new sphere, and the smallest one changes the envelope by next to nothing. */

@@ -61,8 +61,10 @@ static qmat_status measure(qmat_context *context, const qmat_surface *surface, c
   qmat_hausdorff_bound bound = {0};
   qmat_status status = qmat_envelope_of_medial(context, unit, &envelope);
   if (status == QMAT_OK)
-    status = qmat_boundary_distance_measure(context, surface, envelope, unit, threshold, TOLERANCE, false, false,
-                                            SAMPLE_COUNT, &boundary);
+    status = qmat_boundary_distance_measure(
+        context, surface, envelope, unit,
+        &(qmat_boundary_request){.epsilon = threshold, .tolerance = TOLERANCE, .sample_count = SAMPLE_COUNT},
+        &boundary);
   if (status == QMAT_OK)
     status = qmat_hausdorff_bound_measure(context, surface, envelope, 0, FINE_TOLERANCE * threshold, threshold,
                                           -INFINITY, &bound);

@@ -159,6 +159,26 @@ static void test_growing_keeps_contents_and_at_least_doubles(void **state) {
   qmat_free(array);
 }
 
+static void test_growing_in_an_arena_keeps_contents_and_the_old_array(void **state) {
+  (void)state;
+  qmat_arena arena = {NULL};
+  void *array = NULL, *first = NULL;
+  size_t capacity = 0, count = 0;
+  for (; count < 1000; count++) {
+    assert_int_equal(qmat_arena_grow(&arena, &array, &capacity, count + 1, sizeof(uint32_t)), 0);
+    assert_true(capacity > count);
+    if (!first) first = array;
+    ((uint32_t *)array)[count] = (uint32_t)count;
+  }
+  for (size_t i = 0; i < count; i++) assert_int_equal(((uint32_t *)array)[i], i);
+  assert_ptr_not_equal(first, array);
+  assert_int_equal(*(uint32_t *)first, 0);
+  const size_t before = capacity;
+  assert_int_equal(qmat_arena_grow(&arena, &array, &capacity, SIZE_MAX / 4, 8), -1);
+  assert_int_equal(capacity, before);
+  qmat_arena_uninit(&arena);
+}
+
 static void test_growing_beyond_memory_changes_nothing(void **state) {
   (void)state;
   void *array = NULL;
@@ -183,6 +203,7 @@ int main(void) {
       cmocka_unit_test(test_zero_elements_give_a_valid_pointer),
       cmocka_unit_test(test_heap_arrays_are_aligned_and_padded),
       cmocka_unit_test(test_growing_keeps_contents_and_at_least_doubles),
+      cmocka_unit_test(test_growing_in_an_arena_keeps_contents_and_the_old_array),
       cmocka_unit_test(test_growing_beyond_memory_changes_nothing),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -43,6 +43,7 @@ END
     printf '#include "%s.h"\n\nint %s(void) {\n  return value(3);\n}\n' "$name" "$(basename $name)" >"$tree/$name.c"
   done
   printf '# A page\n\n[the code](core/value.c), `sh tests/run.sh`\n' >"$tree/README.md"
+  printf '# Geometry\n\n`surface`\n' >"$tree/core/geometry/README.md"
   : >"$tree/tests/run.sh"
   echo 9999 >"$tree/tests/house/product_lines"
 }
@@ -180,6 +181,8 @@ echo 'The Mantle of a cone.' >>"$tree/README.md"
 fails 'README.md:4: not a word of the field' words
 echo '[a page](missing.md)' >>"$tree/README.md"
 fails 'README.md:4: there is no missing.md' links
+cp "$tree/core/geometry/surface.h" "$tree/core/geometry/other.h"
+fails 'core/geometry/README.md: it does not name other.h' links
 rm "$tree/tests/run.sh"
 fails 'README.md:3: there is no tests/run.sh' links
 

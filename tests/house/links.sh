@@ -1,9 +1,18 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What the pages point at is there, as are the scripts that they name: links.sh SOURCE_FOLDER
+# What the pages point at is there, as are the scripts that they name. The page of core/geometry names each header of the
+# folder: links.sh SOURCE_FOLDER
 set -eu
 . "$(dirname "$0")/files.sh"
 cd "$1"
+missing=0
+for header in core/geometry/*.h; do
+  name=$(basename "$header" .h)
+  if ! grep -q "\`$name\(\.h\)\{0,1\}\`" core/geometry/README.md; then
+    echo "core/geometry/README.md: it does not name $name.h"
+    missing=1
+  fi
+done
 source_files . | grep '\.md$' | xargs awk '
   /^```/ { fenced = !fenced; next }
   !fenced {
@@ -29,5 +38,5 @@ source_files . | grep '\.md$' | xargs awk '
       bad=1
     fi
   done
-  exit $bad
+  exit $((bad | missing))
 }

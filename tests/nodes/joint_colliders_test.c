@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/vector.h"
+#include "nodes/colliders/joint_division.h"
 #include "nodes/colliders/joint_points.h"
 #include "nodes/colliders/shape_set.h"
 #include "tests/medial_meshes.h"

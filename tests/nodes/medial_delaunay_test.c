@@ -12,7 +12,7 @@
 #include "core/geometry/surface.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
-#include "nodes/measure/topology.h"
+#include "nodes/measure/medial_topology.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_build.h"
-#include "nodes/measure/topology.h"
+#include "nodes/measure/medial_topology.h"
 #include "tests/nodes/pipeline.h"
 
 static const char *const sampling = "spacing=12% n_f=0", *const no_division = "spacing=100%";

@@ -74,7 +74,10 @@ static qmat_envelope *envelope_of(qmat_context *context, const random_medial *m)
 static void check_foot(const qmat_envelope *envelope, const random_medial *m, const double p[3], double wanted) {
   uint32_t ids[3];
   double weights[3], sphere[4] = {0}, sum = 0;
-  assert_exact(qmat_envelope_foot_within(envelope, p, wanted + 1e-9, ids, weights), wanted);
+  size_t nearest, primitive;
+  qmat_envelope_distance(envelope, p, &nearest);
+  assert_exact(qmat_envelope_foot_within(envelope, p, wanted + 1e-9, &primitive, ids, weights), wanted);
+  assert_int_equal(primitive, nearest);
   for (size_t k = 0; k < 3; k++) {
     sum += weights[k];
     if (ids[k] == UINT32_MAX) assert_true(k > 0 && weights[k] == 0);
@@ -83,7 +86,7 @@ static void check_foot(const qmat_envelope *envelope, const random_medial *m, co
   assert_exact(sum, 1);
   assert_exact(qmat_sphere_distance(sphere, p), wanted);
   uint32_t untouched[3] = {7, 8, 9};
-  assert_true(qmat_envelope_foot_within(envelope, p, wanted - 1e-9, untouched, weights) == INFINITY);
+  assert_true(qmat_envelope_foot_within(envelope, p, wanted - 1e-9, NULL, untouched, weights) == INFINITY);
   assert_true(untouched[0] == 7 && untouched[1] == 8 && untouched[2] == 9);
 }
 

@@ -160,6 +160,32 @@ static void test_a_copy_has_the_same_digest_and_arrays_of_its_own(void **state) 
   qmat_value_release(&late->base);
 }
 
+static void test_side_k_lies_opposite_to_corner_k_and_a_missing_one_is_named(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  uint32_t edges[] = {0, 1, 0, 2, 1, 2, 1, 3, 2, 3}, triangles[] = {0, 1, 2, 1, 2, 3}, sides[6];
+  qmat_medial medial = {.edge_count = 5, .triangle_count = 2, .edges = edges, .triangles = triangles};
+  assert_int_equal(qmat_medial_sides(&context, &medial, sides), QMAT_OK);
+  const uint32_t expected[] = {2, 1, 0, 4, 3, 2};
+  assert_memory_equal(sides, expected, sizeof expected);
+  medial.edge_count = 4;
+  assert_int_equal(qmat_medial_sides(&context, &medial, sides), QMAT_ERROR_INTERNAL);
+  assert_string_equal(context.error.message, "the medial mesh lacks the edge 2 3");
+  assert_string_equal(context.error.element_kind, "triangle");
+  assert_int_equal(context.error.element, 1);
+}
+
+static void test_rows_of_an_id_that_goes_are_left_out_and_the_others_renumbered(void **state) {
+  (void)state;
+  const uint32_t ids[] = {0, QMAT_NONE, 1, 1, 7};
+  uint32_t rows[] = {0, 2, 1, 2, 4, 1, 2, 3, 4, 0}, kept[10];
+  const uint32_t expected[] = {0, 1, 1, 1, 7, 0};
+  assert_int_equal(qmat_medial_renumber(rows, 5, 2, ids, kept), 3);
+  assert_memory_equal(kept, expected, sizeof expected);
+  assert_int_equal(qmat_medial_renumber(rows, 5, 2, ids, rows), 3);
+  assert_memory_equal(rows, expected, sizeof expected);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_rows_come_out_sorted_once_and_with_the_edges_of_triangles),
@@ -168,6 +194,8 @@ int main(void) {
       cmocka_unit_test(test_random_rows_agree_with_a_table_and_setting_them_again_changes_nothing),
       cmocka_unit_test(test_a_simplex_is_found_where_it_is_and_nowhere_else),
       cmocka_unit_test(test_a_copy_has_the_same_digest_and_arrays_of_its_own),
+      cmocka_unit_test(test_side_k_lies_opposite_to_corner_k_and_a_missing_one_is_named),
+      cmocka_unit_test(test_rows_of_an_id_that_goes_are_left_out_and_the_others_renumbered),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

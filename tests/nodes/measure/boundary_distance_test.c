@@ -48,9 +48,11 @@ static measured measure(double epsilon, bool only_places, int threads) {
   assert_int_equal(qmat_envelope_new(&context, unit->spheres, 2, NULL, 0, NULL, 0, &envelope), QMAT_OK);
   const double scale = frame->diagonal;
   qmat_boundary_distance found;
-  assert_int_equal(qmat_boundary_distance_measure(&context, surface, envelope, unit, epsilon / scale, 0.1, false,
-                                                  only_places, 0, &found),
-                   QMAT_OK);
+  assert_int_equal(
+      qmat_boundary_distance_measure(
+          &context, surface, envelope, unit,
+          &(qmat_boundary_request){.epsilon = epsilon / scale, .tolerance = 0.1, .only_places = only_places}, &found),
+      QMAT_OK);
   measured result = {.lo = found.either_side.lo * scale, .hi = found.either_side.hi * scale};
   for (size_t i = 0; i < found.far_count; i++) {
     const double *place = &found.far_points[3 * i];

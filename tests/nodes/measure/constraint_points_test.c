@@ -72,12 +72,15 @@ static double at_witness(const qmat_complex *c, const qmat_constraint_points *pl
   return qmat_sphere_distance(sphere, &places->points[3 * i]);
 }
 
+static void make_places(model *m, double spacing, double enough, qmat_constraint_points *places) {
+  const qmat_place_request request = {m->p.mesh, m->positions, m->p.samples, m->unit_samples, spacing, 20000, enough};
+  assert_int_equal(qmat_surface_places_make(&m->context, &request, m->p.medial, &m->complex, places), QMAT_OK);
+}
+
 /* Checks the distances of all places. Returns how many are above `enough`. */
 static size_t check_places(model *m, double spacing, double enough) {
   qmat_constraint_points places;
-  assert_int_equal(qmat_surface_places_make(&m->context, m->p.mesh, m->positions, m->p.samples, m->unit_samples,
-                                            m->p.medial, &m->complex, spacing, 20000, enough, &places),
-                   QMAT_OK);
+  make_places(m, spacing, enough, &places);
   size_t far_count = 0;
   for (size_t i = 0; i < places.count; i++) {
     const double f = brute_force(&m->complex, &places.points[3 * i]), found = places.distances[i];
@@ -125,9 +128,7 @@ static void test_places_inside_large_facets_are_farther_apart_than_on_sides(void
   make_model(&m, shape_box(2, 2, 2), "spacing=20% n_f=0");
   for (size_t i = 0; i < 2; i++) {
     qmat_constraint_points places;
-    assert_int_equal(qmat_surface_places_make(&m.context, m.p.mesh, m.positions, m.p.samples, m.unit_samples,
-                                              m.p.medial, &m.complex, cases[i].spacing, 20000, 1, &places),
-                     QMAT_OK);
+    make_places(&m, cases[i].spacing, 1, &places);
     assert_int_equal(places.count - places.sample_count,
                      12 * cases[i].on_sides + 6 * cases[i].on_diagonals + 12 * cases[i].in_rows);
   }

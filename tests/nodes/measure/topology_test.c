@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "nodes/simplify/topology_searches.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/random.h"

@@ -8,7 +8,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_complex.h"
-#include "nodes/measure/topology.h"
+#include "nodes/measure/medial_topology.h"
 #include "tests/medial_meshes.h"
 #include "tests/random.h"
 

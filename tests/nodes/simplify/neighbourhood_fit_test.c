@@ -78,9 +78,10 @@ static void free_chain(chain *c) {
 static double fit(chain *c, size_t others) {
   static const uint32_t neighbour = 2;
   double error;
-  assert_int_equal(qmat_neighbourhood_fit_start(&c->context, &c->fit, &c->surface_tracker, &c->complex, &c->collapse,
-                                                merged, &neighbour, others, POINTS, 0.05),
-                   QMAT_OK);
+  const qmat_fit_request request = {merged, &neighbour, others, POINTS, 0.05};
+  assert_int_equal(
+      qmat_neighbourhood_fit_start(&c->context, &c->fit, &c->surface_tracker, &c->complex, &c->collapse, &request),
+      QMAT_OK);
   qmat_neighbourhood_fit_run(&c->fit, &c->complex, false, &error);
   return error;
 }

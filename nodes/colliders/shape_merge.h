@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef QMAT_NODES_COLLIDERS_SHAPE_MERGE_H
+#define QMAT_NODES_COLLIDERS_SHAPE_MERGE_H
+
+#include "nodes/colliders/shape_set.h"
+
+/* Joins pairs of shapes, the least growth of volume first, until at most `most` are left, or none has another one
+ * of its joint. The shape for both is the hull of some of their spheres; `growth` times what the others leave it by is
+ * added to its radii, so that 1 makes it contain both. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: quadratic in the
+ * shapes. */
+qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qmat_shape_kind kind, double growth,
+                                 size_t most);
+
+#endif
