@@ -2,9 +2,9 @@
 #include "core/geometry/winding_tree.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/morton.h"
 #include "core/geometry/triangle.h"
 
 #define LEAF_SIZE 8
@@ -74,27 +74,6 @@ double qmat_winding_tree_number(const qmat_winding_tree *tree, const double poin
   return winding;
 }
 
-typedef struct sort_item {
-  uint64_t code;
-  uint32_t triangle;
-} sort_item;
-
-static int compare_items(const void *left, const void *right) {
-  const sort_item *a = left, *b = right;
-  if (a->code != b->code) return a->code < b->code ? -1 : 1;
-  return a->triangle < b->triangle ? -1 : a->triangle > b->triangle;
-}
-
-/* Spreads the bits of a 21-bit number to every third bit of the result. */
-static uint64_t spread_bits(uint64_t x) {
-  x &= 0x1fffff;
-  x = (x | x << 32) & 0x1f00000000ffff;
-  x = (x | x << 16) & 0x1f0000ff0000ff;
-  x = (x | x << 8) & 0x100f00f00f00f00f;
-  x = (x | x << 4) & 0x10c30c30c30c30c3;
-  return (x | x << 2) & 0x1249249249249249;
-}
-
 static void area_and_centroid(const qmat_winding_tree *tree, uint32_t triangle, double area_vector[3],
                               double centroid[3]) {
   const double *a = corner_position(tree, triangle, 0), *b = corner_position(tree, triangle, 1),
@@ -157,20 +136,15 @@ static void fill_inner(const qmat_winding_tree *tree, size_t index, double *area
 }
 
 /* Sorts the triangles along a curve that fills the box. */
-static void sort_along_curve(qmat_winding_tree *tree, const uint32_t *chosen, sort_item *items) {
+static void sort_along_curve(qmat_winding_tree *tree, const uint32_t *chosen, qmat_curve_item *items) {
   for (size_t i = 0; i < tree->count; i++) {
     const uint32_t triangle = chosen ? chosen[i] : (uint32_t)i;
     double vector[3], centroid[3];
     area_and_centroid(tree, triangle, vector, centroid);
-    uint64_t code = 0;
-    for (int k = 0; k < 3; k++) {
-      const double cell = (centroid[k] + 0.5) * 2097151; /* 2^21 - 1 */
-      code |= spread_bits((uint64_t)fmin(fmax(cell, 0), 2097151)) << k;
-    }
-    items[i] = (sort_item){code, triangle};
+    items[i] = (qmat_curve_item){qmat_curve_code(centroid), triangle};
   }
-  qsort(items, tree->count, sizeof *items, compare_items);
-  for (size_t i = 0; i < tree->count; i++) tree->order[i] = items[i].triangle;
+  qmat_curve_sort(items, tree->count);
+  for (size_t i = 0; i < tree->count; i++) tree->order[i] = items[i].id;
 }
 
 static qmat_status build(qmat_context *context, const uint32_t *chosen, qmat_winding_tree *tree) {
@@ -178,7 +152,7 @@ static qmat_status build(qmat_context *context, const uint32_t *chosen, qmat_win
   const int threads = qmat_threads(context);
   size_t leaf_count = 1;
   while (leaf_count * LEAF_SIZE < n) leaf_count *= 2;
-  sort_item *items = qmat_alloc(n, sizeof *items);
+  qmat_curve_item *items = qmat_alloc(n, sizeof *items);
   double *areas = qmat_alloc(2 * leaf_count, sizeof *areas);
   tree->order = qmat_alloc(n, sizeof *tree->order);
   tree->nodes = qmat_calloc(2 * leaf_count, sizeof *tree->nodes);
