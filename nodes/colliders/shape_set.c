@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/geometry/vector.h"
+#include "nodes/mesh/box_pairs_cgal.h"
 
 enum { MOST_ROWS = 64 };
 
@@ -228,20 +229,84 @@ static bool holds(const qmat_prepared_shape *outer, const double *spheres, const
   return true;
 }
 
-/* Marks the shapes that are inside another one; of equal ones the first stays. */
-static qmat_status mark_nested(qmat_context *context, const qmat_shape_set *set, uint8_t *dropped) {
-  qmat_prepared_shape *prepared = qmat_arena_alloc(&context->arena, set->shape_count, sizeof *prepared);
-  if (!prepared) return qmat_fail_memory(context, "the colliders");
-  for (size_t i = 0; i < set->shape_count; i++) qmat_shape_prepare(&prepared[i], set->spheres, &set->shapes[3 * i]);
-  for (size_t i = set->shape_count; i-- > 0;) {
-    const uint32_t *ids = &set->shapes[3 * i];
-    const qmat_status status = qmat_progress(context, set->shape_count - i, set->shape_count, "shapes compared");
-    if (status != QMAT_OK) return status;
-    for (size_t j = 0; j < set->shape_count && !dropped[i]; j++)
-      if (j != i && !dropped[j] && qmat_shape_set_same_joint(set, i, j) && holds(&prepared[j], set->spheres, ids))
-        dropped[i] = 1;
+/* A box around a shape is larger by this, so that it holds the centres of all spheres that the shape holds. */
+static const double around_shape = 1e-9;
+
+/* Shapes that hold others. */
+typedef struct nesting {
+  qmat_context *context;
+  const qmat_shape_set *set;
+  qmat_prepared_shape *prepared;
+  uint8_t *dropped;
+  uint32_t *holders; /* pairs: a shape, and a later one that holds it; on the heap */
+  size_t count, capacity;
+} nesting;
+
+static double *boxes_of(qmat_context *context, const qmat_shape_set *set) {
+  double *boxes = qmat_arena_alloc(&context->arena, set->shape_count, 6 * sizeof *boxes);
+  for (size_t i = 0; boxes && i < set->shape_count; i++)
+    for (int k = 0; k < 3; k++) {
+      double low = INFINITY, high = -INFINITY;
+      for (int c = 0; c < 3; c++) {
+        const double *s = &set->spheres[4 * (size_t)set->shapes[3 * i + (size_t)c]];
+        low = fmin(low, s[k] - s[3]);
+        high = fmax(high, s[k] + s[3]);
+      }
+      boxes[6 * i + (size_t)k] = low - around_shape;
+      boxes[6 * i + 3 + (size_t)k] = high + around_shape;
+    }
+  return boxes;
+}
+
+/* The centres of the first spheres, as boxes. */
+static double *centres_of(qmat_context *context, const qmat_shape_set *set) {
+  double *centres = qmat_arena_alloc(&context->arena, set->shape_count, 6 * sizeof *centres);
+  for (size_t i = 0; centres && i < set->shape_count; i++)
+    for (size_t k = 0; k < 6; k++) centres[6 * i + k] = set->spheres[4 * (size_t)set->shapes[3 * i] + k % 3];
+  return centres;
+}
+
+/* Looks whether a shape whose box holds the centre of another one holds it all. */
+static qmat_status note_holder(void *data, uint32_t inner, uint32_t outer) {
+  nesting *n = data;
+  const qmat_status status = qmat_progress(n->context, 1, 0, "shapes compared");
+  if (status != QMAT_OK || inner == outer || n->dropped[inner]) return status;
+  if (!qmat_shape_set_same_joint(n->set, inner, outer) ||
+      !holds(&n->prepared[outer], n->set->spheres, &n->set->shapes[3 * (size_t)inner]))
+    return QMAT_OK;
+  if (outer < inner) {
+    n->dropped[inner] = 1; /* later ones are dropped first */
+    return QMAT_OK;
   }
+  if (qmat_grow((void **)&n->holders, &n->capacity, 2 * n->count + 2, sizeof *n->holders) != 0)
+    return qmat_fail_memory(n->context, "the colliders");
+  n->holders[2 * n->count] = inner;
+  n->holders[2 * n->count++ + 1] = outer;
   return QMAT_OK;
+}
+
+static int compare_holders(const void *left, const void *right) {
+  const uint32_t *a = left, *b = right;
+  if (a[0] != b[0]) return a[0] > b[0] ? -1 : 1;
+  return (a[1] > b[1]) - (a[1] < b[1]);
+}
+
+/* Marks the shapes that are inside another one; of equal ones the first stays. The last is looked at first: one that is
+ * dropped holds no other. */
+static qmat_status mark_nested(qmat_context *context, const qmat_shape_set *set, uint8_t *dropped) {
+  const size_t count = set->shape_count;
+  nesting n = {.context = context, .set = set, .dropped = dropped};
+  if (count < 2) return QMAT_OK;
+  n.prepared = qmat_arena_alloc(&context->arena, count, sizeof *n.prepared);
+  const double *boxes = boxes_of(context, set), *centres = centres_of(context, set);
+  if (!n.prepared || !boxes || !centres) return qmat_fail_memory(context, "the colliders");
+  for (size_t i = 0; i < count; i++) qmat_shape_prepare(&n.prepared[i], set->spheres, &set->shapes[3 * i]);
+  const qmat_status status = qmat_find_box_pairs(context, centres, count, boxes, count, note_holder, &n);
+  if (status == QMAT_OK && n.count > 0) qsort(n.holders, n.count, 2 * sizeof *n.holders, compare_holders);
+  for (size_t i = 0; i < n.count && status == QMAT_OK; i++)
+    if (!dropped[n.holders[2 * i + 1]]) dropped[n.holders[2 * i]] = 1;
+  qmat_free(n.holders);
+  return status;
 }
 
 qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set) {
