@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/morton.h"
 #include "core/geometry/vector.h"
-#include "nodes/mesh/box_pairs_cgal.h"
 
 enum { MOST_ROWS = 64 };
 
@@ -240,37 +240,65 @@ typedef struct nesting {
   uint8_t *dropped;
   uint32_t *holders; /* pairs: a shape, and a later one that holds it; on the heap */
   size_t count, capacity;
+  qmat_curve_item *order;
+  double (*boxes)[6];
+  size_t group_count; /* a power of two */
 } nesting;
 
-static double *boxes_of(qmat_context *context, const qmat_shape_set *set) {
-  double *boxes = qmat_arena_alloc(&context->arena, set->shape_count, 6 * sizeof *boxes);
-  for (size_t i = 0; boxes && i < set->shape_count; i++)
-    for (int k = 0; k < 3; k++) {
-      double low = INFINITY, high = -INFINITY;
-      for (int c = 0; c < 3; c++) {
-        const double *s = &set->spheres[4 * (size_t)set->shapes[3 * i + (size_t)c]];
-        low = fmin(low, s[k] - s[3]);
-        high = fmax(high, s[k] + s[3]);
-      }
-      boxes[6 * i + (size_t)k] = low - around_shape;
-      boxes[6 * i + 3 + (size_t)k] = high + around_shape;
+/* The box of a shape: the least x, y, z, then the largest. */
+static void box_of(const qmat_shape_set *set, size_t shape, double box[6]) {
+  for (int k = 0; k < 3; k++) {
+    double low = INFINITY, high = -INFINITY;
+    for (int c = 0; c < 3; c++) {
+      const double *s = &set->spheres[4 * (size_t)set->shapes[3 * shape + (size_t)c]];
+      low = fmin(low, s[k] - s[3]);
+      high = fmax(high, s[k] + s[3]);
     }
-  return boxes;
+    box[k] = low - around_shape;
+    box[3 + k] = high + around_shape;
+  }
 }
 
-/* The centres of the first spheres, as boxes. */
-static double *centres_of(qmat_context *context, const qmat_shape_set *set) {
-  double *centres = qmat_arena_alloc(&context->arena, set->shape_count, 6 * sizeof *centres);
-  for (size_t i = 0; centres && i < set->shape_count; i++)
-    for (size_t k = 0; k < 6; k++) centres[6 * i + k] = set->spheres[4 * (size_t)set->shapes[3 * i] + k % 3];
-  return centres;
+static const double *centre_of(const qmat_shape_set *set, size_t shape) {
+  return &set->spheres[4 * (size_t)set->shapes[3 * shape]];
 }
 
-/* Looks whether a shape whose box holds the centre of another one holds it all. */
-static qmat_status note_holder(void *data, uint32_t inner, uint32_t outer) {
-  nesting *n = data;
-  const qmat_status status = qmat_progress(n->context, 1, 0, "shapes compared");
-  if (status != QMAT_OK || inner == outer || n->dropped[inner]) return status;
+/* So many shapes share a box of their centres. */
+enum { GROUP_SIZE = 8 };
+
+/* Makes the tree: shapes along a curve through their first centres, and the boxes of groups of them. Node 1 is the
+ * root; the children of k are 2 k and 2 k + 1. */
+static bool make_groups(nesting *n) {
+  const size_t count = n->set->shape_count;
+  n->group_count = 1;
+  while (n->group_count * GROUP_SIZE < count) n->group_count *= 2;
+  n->order = qmat_arena_alloc(&n->context->arena, count, sizeof *n->order);
+  n->boxes = qmat_arena_alloc(&n->context->arena, 2 * n->group_count, sizeof *n->boxes);
+  if (!n->order || !n->boxes) return false;
+  for (size_t i = 0; i < count; i++)
+    n->order[i] = (qmat_curve_item){qmat_curve_code(centre_of(n->set, i)), (uint32_t)i};
+  qmat_curve_sort(n->order, count);
+  for (size_t g = 2 * n->group_count; g-- > 1;)
+    for (size_t k = 0; k < 3; k++) {
+      double low = INFINITY, high = -INFINITY;
+      for (size_t c = 0; c < 2 && g < n->group_count; c++) {
+        low = fmin(low, n->boxes[2 * g + c][k]);
+        high = fmax(high, n->boxes[2 * g + c][3 + k]);
+      }
+      const size_t first = (g - n->group_count) * GROUP_SIZE;
+      for (size_t i = first; g >= n->group_count && i < first + GROUP_SIZE && i < count; i++) {
+        low = fmin(low, centre_of(n->set, n->order[i].id)[k]);
+        high = fmax(high, centre_of(n->set, n->order[i].id)[k]);
+      }
+      n->boxes[g][k] = low;
+      n->boxes[g][3 + k] = high;
+    }
+  return true;
+}
+
+/* Looks whether a shape whose box may hold the centre of another one holds it all. */
+static qmat_status note_holder(nesting *n, uint32_t inner, uint32_t outer) {
+  if (inner == outer || n->dropped[inner]) return QMAT_OK;
   if (!qmat_shape_set_same_joint(n->set, inner, outer) ||
       !holds(&n->prepared[outer], n->set->spheres, &n->set->shapes[3 * (size_t)inner]))
     return QMAT_OK;
@@ -283,6 +311,22 @@ static qmat_status note_holder(void *data, uint32_t inner, uint32_t outer) {
   n->holders[2 * n->count] = inner;
   n->holders[2 * n->count++ + 1] = outer;
   return QMAT_OK;
+}
+
+/* Looks at the shapes below a node whose centres are in the box of shape `outer`. */
+static qmat_status search_group(nesting *n, size_t node, const double box[6], uint32_t outer) {
+  const double *own = n->boxes[node];
+  for (int k = 0; k < 3; k++)
+    if (own[k] > box[3 + k] || own[3 + k] < box[k]) return QMAT_OK;
+  qmat_status status = QMAT_OK;
+  if (node < n->group_count) {
+    for (size_t c = 0; c < 2 && status == QMAT_OK; c++) status = search_group(n, 2 * node + c, box, outer);
+    return status;
+  }
+  const size_t first = (node - n->group_count) * GROUP_SIZE;
+  for (size_t i = first; i < first + GROUP_SIZE && i < n->set->shape_count && status == QMAT_OK; i++)
+    status = note_holder(n, n->order[i].id, outer);
+  return status;
 }
 
 static int compare_holders(const void *left, const void *right) {
@@ -298,10 +342,15 @@ static qmat_status mark_nested(qmat_context *context, const qmat_shape_set *set,
   nesting n = {.context = context, .set = set, .dropped = dropped};
   if (count < 2) return QMAT_OK;
   n.prepared = qmat_arena_alloc(&context->arena, count, sizeof *n.prepared);
-  const double *boxes = boxes_of(context, set), *centres = centres_of(context, set);
-  if (!n.prepared || !boxes || !centres) return qmat_fail_memory(context, "the colliders");
+  if (!n.prepared || !make_groups(&n)) return qmat_fail_memory(context, "the colliders");
   for (size_t i = 0; i < count; i++) qmat_shape_prepare(&n.prepared[i], set->spheres, &set->shapes[3 * i]);
-  const qmat_status status = qmat_find_box_pairs(context, centres, count, boxes, count, note_holder, &n);
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+    double box[6];
+    box_of(set, i, box);
+    status = qmat_progress(context, i, count, "shapes compared");
+    if (status == QMAT_OK) status = search_group(&n, 1, box, (uint32_t)i);
+  }
   if (status == QMAT_OK && n.count > 0) qsort(n.holders, n.count, 2 * sizeof *n.holders, compare_holders);
   for (size_t i = 0; i < n.count && status == QMAT_OK; i++)
     if (!dropped[n.holders[2 * i + 1]]) dropped[n.holders[2 * i]] = 1;

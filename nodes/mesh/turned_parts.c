@@ -128,18 +128,18 @@ static size_t choose_points(const turner *t, const qmat_part *part, placed_trian
 /* Parts with more triangles than this are asked through a tree. */
 enum { MOST_SUMMED = 256 };
 /* So near to one half a tree decides nothing, and triangles are summed. */
-static const double doubt = 0.1;
-/* Parts, and points in doubt, between two calls of the progress function. */
-enum { SLICE = 64, DOUBTS_SLICE = 8 };
+static const double near_half = 0.1;
+/* Parts, and undecided points, between two calls of the progress function. */
+enum { SLICE = 64, SUMMED_SLICE = 8 };
 
 /* Parts that are tested together, and their points, one after the other. */
 typedef struct batch {
   size_t first_pair[SLICE + 1]; /* pairs by part */
   size_t first_point[SLICE + 1];
-  size_t part_count, doubt_count;
+  size_t part_count, undecided_count;
   double points[SLICE * POINTS][3];
   uint8_t wound[SLICE * POINTS];
-  uint16_t part_of[SLICE * POINTS], doubts[SLICE * POINTS];
+  uint16_t part_of[SLICE * POINTS], undecided[SLICE * POINTS];
 } batch;
 
 static qmat_status make_trees(turner *t) {
@@ -191,16 +191,16 @@ static qmat_status test_points(const turner *t, batch *b) {
   double winding[SLICE * POINTS];
 #pragma omp parallel for num_threads(threads) schedule(dynamic)
   for (size_t i = 0; i < count; i++) winding[i] = winding_at(t, b, i, false);
-  b->doubt_count = 0;
+  b->undecided_count = 0;
   for (size_t i = 0; i < count; i++) {
     b->wound[i] = winding[i] > 0.5;
-    if (fabs(winding[i] - 0.5) < doubt) b->doubts[b->doubt_count++] = (uint16_t)i;
+    if (fabs(winding[i] - 0.5) < near_half) b->undecided[b->undecided_count++] = (uint16_t)i;
   }
   qmat_status status = QMAT_OK;
-  for (size_t first = 0; first < b->doubt_count && status == QMAT_OK; first += DOUBTS_SLICE) {
-    const size_t end = first + DOUBTS_SLICE < b->doubt_count ? first + DOUBTS_SLICE : b->doubt_count;
+  for (size_t first = 0; first < b->undecided_count && status == QMAT_OK; first += SUMMED_SLICE) {
+    const size_t end = first + SUMMED_SLICE < b->undecided_count ? first + SUMMED_SLICE : b->undecided_count;
 #pragma omp parallel for num_threads(threads) schedule(dynamic)
-    for (size_t i = first; i < end; i++) b->wound[b->doubts[i]] = winding_at(t, b, b->doubts[i], true) > 0.5;
+    for (size_t i = first; i < end; i++) b->wound[b->undecided[i]] = winding_at(t, b, b->undecided[i], true) > 0.5;
     status = qmat_progress(t->context, b->first_pair[0], t->pair_count, "parts");
   }
   return status;

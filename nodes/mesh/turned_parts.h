@@ -16,7 +16,7 @@ typedef enum qmat_facing {
  * it from inside makes no difference. The order of the triangles makes none either. `parts->positions` are in a unit
  * frame. QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY, QMAT_CANCELLED. Threads: the context's. Cost: n log n, and for each
  * part that faces inwards and each part whose box holds points of it 15 queries of a winding number tree; where these
- * leave doubt, the solid angles of all triangles of the other part. */
+ * leave a point undecided, the solid angles of all triangles of the other part. */
 qmat_status qmat_find_turned_parts(qmat_context *context, const qmat_parts *parts, uint8_t *facing);
 
 #endif
