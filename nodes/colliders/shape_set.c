@@ -313,7 +313,7 @@ static qmat_status note_holder(nesting *n, uint32_t inner, uint32_t outer) {
   return QMAT_OK;
 }
 
-/* Looks at the shapes below a node whose centres are in the box of shape `outer`. */
+/* Tests the shapes below a node whose centres may be in the box of shape `outer`. */
 static qmat_status search_group(nesting *n, size_t node, const double box[6], uint32_t outer) {
   const double *own = n->boxes[node];
   for (int k = 0; k < 3; k++)
