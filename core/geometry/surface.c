@@ -13,6 +13,7 @@
 #include "core/geometry/triangle.h"
 #include "core/geometry/triangle_blocks.h"
 #include "core/geometry/vector.h"
+#include "core/geometry/winding_tree.h"
 
 /* Embree computes in single precision. In the unit frame coordinates are at most 1/2 and rays about 2 long, so its hits
  * are within a few 1e-7 of the triangle's plane. TIE is well above that. */
@@ -22,16 +23,6 @@
 /* A crossing whose barycentric coordinate or cosine is below this may have hit an edge. */
 #define GRAZING 1e-4f
 #define RAY_COUNT 7
-#define LEAF_SIZE 8
-/* A node farther away than this many of its radii is evaluated as one dipole (Barill et al. 2018, section 3). */
-#define DIPOLE_BETA 2.3
-
-/* A node of the winding number tree: its triangles as one dipole. */
-typedef struct winding_node {
-  double centre[3];
-  double area_vector[3];
-  double radius; /* of a ball around the centre that contains all its triangles */
-} winding_node;
 
 struct qmat_surface {
   qmat_kept kept; /* with the mesh */
@@ -47,12 +38,7 @@ struct qmat_surface {
   qmat_triangle_blocks *blocks;       /* for distances to solids; NULL: the mesh has sheets only */
   qmat_triangle_blocks *sheet_blocks; /* NULL: the mesh has no sheets */
   double half_thickness;              /* of sheets */
-  /* The winding number tree of a surface that is not closed and oriented. Node 1 is the root; node k has the children
-   * 2 k and 2 k + 1; leaf k is node leaf_count + k and contains the triangles
-   * order[k * n / leaf_count .. (k + 1) * n / leaf_count). */
-  size_t leaf_count; /* a power of two; 0: no tree */
-  winding_node *nodes;
-  uint32_t *order;
+  qmat_winding_tree *winding;         /* of solids that are not closed and oriented; else NULL */
 };
 
 typedef enum query_kind { COUNT_CROSSINGS, NEAREST_HIT } query_kind;
@@ -205,52 +191,11 @@ static bool inside_by_rays(const qmat_surface *surface, const double point[3]) {
   return score > 0;
 }
 
-/* The solid angle of a triangle as seen from a point, over 4 pi. */
-static double solid_angle(const qmat_surface *surface, uint32_t triangle, const double point[3]) {
-  double y, x;
-  qmat_triangle_half_angle(corner_position(surface, triangle, 0), corner_position(surface, triangle, 1),
-                           corner_position(surface, triangle, 2), point, &y, &x);
-  return y == 0 ? 0 : atan2(y, x) * (1 / (2 * QMAT_PI));
-}
-
-static void leaf_range(const qmat_surface *surface, size_t leaf, size_t *begin, size_t *end) {
-  const size_t n = surface->solid_count;
-  /* This is leaf * n / leaf_count without overflow. */
-  const size_t share = n / surface->leaf_count, rest = n % surface->leaf_count;
-  *begin = leaf * share + leaf * rest / surface->leaf_count;
-  *end = (leaf + 1) * share + (leaf + 1) * rest / surface->leaf_count;
-}
-
-static double winding_number(const qmat_surface *surface, const double point[3]) {
-  size_t stack[72];
-  int depth = 0;
-  stack[depth++] = 1;
-  double winding = 0;
-  while (depth > 0) {
-    const size_t index = stack[--depth];
-    const winding_node *node = surface->nodes + index;
-    double offset[3];
-    qmat_subtract(node->centre, point, offset);
-    const double square = qmat_dot(offset, offset);
-    if (square > DIPOLE_BETA * DIPOLE_BETA * node->radius * node->radius) {
-      winding += qmat_dot(node->area_vector, offset) / (square * sqrt(square)) * (1 / (4 * QMAT_PI));
-    } else if (index >= surface->leaf_count) {
-      size_t begin, end;
-      leaf_range(surface, index - surface->leaf_count, &begin, &end);
-      for (size_t i = begin; i < end; i++) winding += solid_angle(surface, surface->order[i], point);
-    } else {
-      stack[depth++] = 2 * index + 1;
-      stack[depth++] = 2 * index;
-    }
-  }
-  return winding;
-}
-
 bool qmat_surface_inside(const qmat_surface *surface, const double point[3]) {
   for (int axis = 0; axis < 3; axis++) {
     if (!(point[axis] >= surface->low[axis] && point[axis] <= surface->high[axis])) return false;
   }
-  return surface->leaf_count > 0 ? winding_number(surface, point) > 0.5 : inside_by_rays(surface, point);
+  return surface->winding ? qmat_winding_tree_number(surface->winding, point) > 0.5 : inside_by_rays(surface, point);
 }
 
 void qmat_surface_inside_many(const qmat_surface *surface, const double *points, size_t count, uint8_t *inside,
@@ -303,7 +248,7 @@ double qmat_surface_signed_distance(const qmat_surface *surface, const double po
 }
 
 bool qmat_surface_is_closed(const qmat_surface *surface) {
-  return surface->leaf_count == 0;
+  return !surface->winding;
 }
 
 double qmat_surface_signed_distance_near(const qmat_surface *surface, const double point[3], double near, double gap) {
@@ -356,7 +301,7 @@ double qmat_surface_excess_bound(const qmat_surface *surface, const double *cons
     if (excess <= limit) return fmax(excess, lowest);
     if (!qmat_surface_inside(surface, centre)) return INFINITY;
   }
-  if (!surface->blocks || surface->leaf_count > 0) return INFINITY;
+  if (!surface->blocks || surface->winding) return INFINITY;
   /* A bound below every radius keeps the distance positive, so that no point of the simplex is outside. */
   for (int i = 0; i < count; i++) limit = fmin(limit, below_radius * spheres[i][3]);
   if (!(limit > least_excess)) return INFINITY;
@@ -365,129 +310,6 @@ double qmat_surface_excess_bound(const qmat_surface *surface, const double *cons
 }
 
 /* --- building --------------------------------------------------------------------------------------------------- */
-
-typedef struct sort_item {
-  uint64_t code;
-  uint32_t triangle;
-} sort_item;
-
-static int compare_items(const void *left, const void *right) {
-  const sort_item *a = left, *b = right;
-  if (a->code != b->code) return a->code < b->code ? -1 : 1;
-  return a->triangle < b->triangle ? -1 : a->triangle > b->triangle;
-}
-
-static void area_and_centroid(const qmat_surface *surface, uint32_t triangle, double area_vector[3],
-                              double centroid[3]) {
-  triangle_normal(surface, triangle, area_vector);
-  const double *a = corner_position(surface, triangle, 0), *b = corner_position(surface, triangle, 1),
-               *c = corner_position(surface, triangle, 2);
-  for (int i = 0; i < 3; i++) {
-    area_vector[i] *= 0.5;
-    centroid[i] = (a[i] + b[i] + c[i]) / 3;
-  }
-}
-
-static double farthest_corner(const qmat_surface *surface, size_t begin, size_t end, const double centre[3]) {
-  double square = 0;
-  for (size_t i = begin; i < end; i++) {
-    for (int corner = 0; corner < 3; corner++) {
-      double offset[3];
-      qmat_subtract(corner_position(surface, surface->order[i], corner), centre, offset);
-      square = qmat_larger(square, qmat_dot(offset, offset));
-    }
-  }
-  return sqrt(square);
-}
-
-/* The area-weighted centre, dipole and radius of the triangles of one leaf. */
-static void fill_leaf(const qmat_surface *surface, winding_node *node, size_t begin, size_t end, double *area) {
-  double vector[3], centroid[3], mean[3] = {0, 0, 0};
-  *area = 0;
-  memset(node, 0, sizeof *node);
-  for (size_t i = begin; i < end; i++) {
-    area_and_centroid(surface, surface->order[i], vector, centroid);
-    const double weight = sqrt(qmat_dot(vector, vector));
-    *area += weight;
-    for (int k = 0; k < 3; k++) {
-      node->area_vector[k] += vector[k];
-      node->centre[k] += weight * centroid[k];
-      mean[k] += centroid[k] / (double)(end - begin);
-    }
-  }
-  for (int k = 0; k < 3; k++) node->centre[k] = *area > 0 ? node->centre[k] / *area : mean[k];
-  node->radius = farthest_corner(surface, begin, end, node->centre);
-}
-
-/* An inner node of the tree, from its two children. */
-static void fill_inner(const qmat_surface *surface, size_t index, double *areas) {
-  const winding_node *left = surface->nodes + 2 * index, *right = left + 1;
-  winding_node *node = surface->nodes + index;
-  const double left_area = areas[2 * index], right_area = areas[2 * index + 1], area = left_area + right_area;
-  areas[index] = area;
-  const double share = area > 0 ? left_area / area : 0.5;
-  for (int k = 0; k < 3; k++) {
-    node->centre[k] = share * left->centre[k] + (1 - share) * right->centre[k];
-    node->area_vector[k] = left->area_vector[k] + right->area_vector[k];
-  }
-  /* Computed from the corners: from the children's balls, radii near the root would be twice too large. */
-  size_t first = index, last = index + 1, begin, end, unused;
-  while (first < surface->leaf_count) first *= 2, last *= 2;
-  leaf_range(surface, first - surface->leaf_count, &begin, &unused);
-  leaf_range(surface, last - 1 - surface->leaf_count, &unused, &end);
-  node->radius = farthest_corner(surface, begin, end, node->centre);
-}
-
-/* Sorts the triangles along a curve that fills the box. */
-static void sort_along_curve(qmat_surface *surface, sort_item *items) {
-  for (size_t i = 0; i < surface->solid_count; i++) {
-    double vector[3], centroid[3];
-    area_and_centroid(surface, (uint32_t)i, vector, centroid);
-    uint64_t code = 0;
-    for (int k = 0; k < 3; k++) {
-      const double cell = (centroid[k] + 0.5) * 2097151; /* 2^21 - 1 */
-      code |= qmat_spread_bits((uint64_t)qmat_smaller(qmat_larger(cell, 0), 2097151)) << k;
-    }
-    items[i] = (sort_item){code, (uint32_t)i};
-  }
-  qsort(items, surface->solid_count, sizeof *items, compare_items);
-  for (size_t i = 0; i < surface->solid_count; i++) surface->order[i] = items[i].triangle;
-}
-
-static qmat_status build_winding_tree(qmat_context *context, qmat_surface *surface) {
-  const size_t n = surface->solid_count;
-  const int threads = qmat_threads(context);
-  size_t leaf_count = 1;
-  while (leaf_count * LEAF_SIZE < n) leaf_count *= 2;
-  sort_item *items = qmat_alloc(n, sizeof *items);
-  double *areas = qmat_alloc(2 * leaf_count, sizeof *areas);
-  surface->order = qmat_alloc(n, sizeof *surface->order);
-  surface->nodes = qmat_calloc(2 * leaf_count, sizeof *surface->nodes); /* node 0 is not used */
-  qmat_status status = QMAT_OK;
-  if (!items || !areas || !surface->order || !surface->nodes) {
-    status = qmat_fail_memory(context, "the winding number tree");
-  } else {
-    surface->leaf_count = leaf_count;
-    sort_along_curve(surface, items);
-    status = qmat_progress(context, 0, 0, "surface");
-  }
-  for (size_t level = leaf_count; level > 0 && status == QMAT_OK; level /= 2) {
-#pragma omp parallel for num_threads(threads) schedule(guided)
-    for (size_t index = level; index < 2 * level; index++) {
-      if (level == leaf_count) {
-        size_t begin, end;
-        leaf_range(surface, index - leaf_count, &begin, &end);
-        fill_leaf(surface, surface->nodes + index, begin, end, areas + index);
-      } else {
-        fill_inner(surface, index, areas);
-      }
-    }
-    status = qmat_progress(context, 0, 0, "surface");
-  }
-  qmat_free(items);
-  qmat_free(areas);
-  return status;
-}
 
 static void keep_message(void *user, enum RTCError code, const char *text) {
   (void)code;
@@ -592,7 +414,7 @@ static qmat_status make_surface(qmat_context *context, const qmat_mesh *mesh, bo
   if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "surface");
   if (status != QMAT_OK) goto failed;
   if (!(mesh->closed && mesh->oriented) && made->solid_count > 0) {
-    status = build_winding_tree(context, made);
+    status = qmat_winding_tree_new(context, made->positions, mesh->triangles, NULL, made->solid_count, &made->winding);
     if (status != QMAT_OK) goto failed;
   }
   *surface = made;
@@ -637,8 +459,7 @@ void qmat_surface_free(qmat_surface *surface) {
   if (surface->scene) rtcReleaseScene(surface->scene);
   if (surface->device) rtcReleaseDevice(surface->device);
   qmat_free(surface->positions);
-  qmat_free(surface->nodes);
-  qmat_free(surface->order);
+  qmat_winding_tree_free(surface->winding);
   qmat_free(surface);
 }
 

@@ -7,9 +7,13 @@
 #include "core/geometry/vector.h"
 #include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/hull_vertices.h"
+#include "nodes/colliders/plane_tree.h"
 
 /* So many points of a heap are reduced. Points inside of the hull of those along every fourth direction go first. */
 enum { MANY_POINTS = 4096, FEW_STRIDE = 4 };
+
+/* Of more planes the farthest of a point is found by a tree. */
+enum { FEW_PLANES = 64 };
 
 /* Those may be so far outside of that hull. */
 static const double least_tolerance = 1e-9;
@@ -20,6 +24,8 @@ typedef struct cloud {
   double *points;
   size_t chosen, left; /* left: the end of those that are */
   double *planes;      /* of the facets of the hull: normal, offset */
+  double (*places)[3]; /* their centroids */
+  qmat_plane_tree tree;
   uint32_t *triangles;
   size_t *farthest; /* of each facet: the number of its farthest point, or `none` */
   double *heights;
@@ -60,14 +66,16 @@ static bool make_room(cloud *c) {
   if (c->chosen <= c->room) return true;
   c->room = 2 * c->chosen;
   qmat_free(c->planes);
+  qmat_free(c->places);
   qmat_free(c->triangles);
   qmat_free(c->farthest);
   qmat_free(c->heights);
   c->planes = qmat_alloc(c->room, 8 * sizeof *c->planes);
+  c->places = qmat_alloc(c->room, 2 * sizeof *c->places);
   c->triangles = qmat_alloc(c->room, 6 * sizeof *c->triangles);
   c->farthest = qmat_alloc(c->room, 2 * sizeof *c->farthest);
   c->heights = qmat_alloc(c->room, 2 * sizeof *c->heights);
-  return c->planes && c->triangles && c->farthest && c->heights;
+  return c->planes && c->places && c->triangles && c->farthest && c->heights;
 }
 
 /* The planes of the hull of the points chosen. */
@@ -78,11 +86,31 @@ static qmat_status find_planes(cloud *c) {
   if (status != QMAT_OK) return status;
   c->plane_count = 0;
   for (size_t t = 0; t < count; t++) {
-    if (!qmat_hull_plane(c->points, &c->triangles[3 * t], &c->planes[4 * c->plane_count])) continue;
+    const uint32_t *corners = &c->triangles[3 * t];
+    if (!qmat_hull_plane(c->points, corners, &c->planes[4 * c->plane_count])) continue;
+    for (size_t k = 0; k < 3; k++)
+      c->places[c->plane_count][k] = (c->points[3 * (size_t)corners[0] + k] + c->points[3 * (size_t)corners[1] + k] +
+                                      c->points[3 * (size_t)corners[2] + k]) /
+                                     3;
     c->farthest[c->plane_count] = none;
     c->heights[c->plane_count++] = 0;
   }
-  return QMAT_OK;
+  if (c->plane_count <= FEW_PLANES) return QMAT_OK;
+  const double(*places)[3] = (const double(*)[3])c->places;
+  return qmat_plane_tree_make(&c->tree, c->planes, places, c->plane_count) ? QMAT_OK : QMAT_ERROR_MEMORY;
+}
+
+/* The plane that a point is the farthest outside of, the first of equal ones, if by more than `*most`; `none`. */
+static size_t farthest_plane(const cloud *c, const double *point, double *most) {
+  size_t plane = none;
+  if (c->plane_count > FEW_PLANES) return qmat_plane_tree_farthest(&c->tree, point, most, NULL);
+  for (size_t t = 0; t < c->plane_count; t++) {
+    const double height = qmat_dot(&c->planes[4 * t], point) - c->planes[4 * t + 3];
+    if (!(height > *most)) continue;
+    *most = height;
+    plane = t;
+  }
+  return plane;
 }
 
 /* Drops points inside of all planes, and finds the farthest of each plane among the points that it is the farthest
@@ -90,13 +118,7 @@ static qmat_status find_planes(cloud *c) {
 static void drop_points(cloud *c, double tolerance) {
   for (size_t i = c->chosen; i < c->left;) {
     double most = tolerance;
-    size_t plane = none;
-    for (size_t t = 0; t < c->plane_count; t++) {
-      const double height = qmat_dot(&c->planes[4 * t], &c->points[3 * i]) - c->planes[4 * t + 3];
-      if (!(height > most)) continue;
-      most = height;
-      plane = t;
-    }
+    const size_t plane = farthest_plane(c, &c->points[3 * i], &most);
     if (plane == none) {
       swap_points(c->points, i, --c->left);
       continue;
@@ -138,7 +160,9 @@ qmat_status qmat_extreme_points_keep(double *points, size_t *count, double toler
   }
   if (status == QMAT_OK && c.chosen >= 4) *count = c.chosen;
   qmat_growing_hull_uninit(&c.hull);
+  qmat_plane_tree_uninit(&c.tree);
   qmat_free(c.planes);
+  qmat_free(c.places);
   qmat_free(c.triangles);
   qmat_free(c.farthest);
   qmat_free(c.heights);

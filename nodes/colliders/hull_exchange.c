@@ -261,7 +261,8 @@ static qmat_status add_pairs(exchange *x, size_t first) {
   return QMAT_OK;
 }
 
-/* The pair whose joint hull adds least; NULL: there is none. `status` may become QMAT_ERROR_MEMORY. */
+/* The pair whose joint hull adds least; NULL: there is none. `status` may become QMAT_ERROR_MEMORY or QMAT_CANCELLED.
+ */
 static pair *best_pair(exchange *x, qmat_status *status) {
   for (;;) {
     pair *best = NULL;
@@ -270,7 +271,8 @@ static pair *best_pair(exchange *x, qmat_status *status) {
       if (x->members[p->a].live && x->members[p->b].live && p->growth < (best ? best->growth : INFINITY)) best = p;
     }
     if (!best || (best->round == x->round && best->tested)) return best;
-    *status = best->round == x->round ? test_pair(x, best) : set_growth(x, best);
+    *status = qmat_progress(x->context, x->steps, x->most_steps, "hulls exchanged");
+    if (*status == QMAT_OK) *status = best->round == x->round ? test_pair(x, best) : set_growth(x, best);
     if (*status != QMAT_OK) return NULL;
   }
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/geometry/vector.h"
+#include "core/side_by_side.h"
 #include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/hull_exchange.h"
 #include "nodes/colliders/hull_outside.h"
@@ -66,15 +67,32 @@ typedef struct merging {
   size_t part_count, live_count;
   pair *pairs;
   size_t pair_count, pair_capacity;
-  joint *joints;      /* one per thread */
-  uint8_t *is_vertex; /* scratch: of a joint hull's points */
+  joint *joints;       /* one per thread */
+  uint8_t *is_vertex;  /* scratch: of a joint hull's points */
+  _Atomic size_t done; /* hulls of those that are made side by side */
 } merging;
 
 /* Records why hulls were not made. */
+static qmat_status record(qmat_context *context, qmat_status status) {
+  if (status == QMAT_OK || status == QMAT_CANCELLED) return status;
+  if (status == QMAT_ERROR_MEMORY) return qmat_fail_memory(context, "the hulls");
+  return qmat_fail(context, status, "rounding spoils the hull of a part of the solid");
+}
+
 static qmat_status fail(const merging *m, qmat_status status) {
-  if (status == QMAT_OK) return QMAT_OK;
-  if (status == QMAT_ERROR_MEMORY) return qmat_fail_memory(m->context, "the hulls");
-  return qmat_fail(m->context, status, "rounding spoils the hull of a part of the solid");
+  return record(m->context, status);
+}
+
+/* The scratch of this thread, which asks the context of its item whether to go on. */
+static joint *joint_of_thread(const merging *m, qmat_context *context) {
+  joint *j = &m->joints[omp_get_thread_num()];
+  j->fine.context = j->coarse.context = j->outer.context = context;
+  return j;
+}
+
+static void end_of_items(const merging *m) {
+  for (int i = 0; i < qmat_threads(m->context); i++)
+    m->joints[i].fine.context = m->joints[i].coarse.context = m->joints[i].outer.context = NULL;
 }
 
 /* The hull of two parts. */
@@ -284,26 +302,24 @@ static qmat_status move_part(merging *m, qmat_solid_part *given, size_t from) {
   return make_part(m, to, true, &m->joints[0], p);
 }
 
+/* The hull of a part; rounding may spoil it. */
+static qmat_status make_part_of(void *data, qmat_context *context, size_t i) {
+  merging *m = data;
+  m->parts[i].shape = m->parts[i].last = m->following[i] = (uint32_t)i;
+  qmat_status status = qmat_progress(context, 1, 0, "hulls");
+  if (status == QMAT_OK && m->given[i].count > 0)
+    status = make_part(m, &m->given[i], false, joint_of_thread(m, context), &m->parts[i]);
+  m->done++;
+  return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : record(context, status);
+}
+
 /* Makes the hulls of all parts, then moves parts without one. */
 static qmat_status make_parts(merging *m, qmat_solid_part *given) {
-  const int threads = qmat_threads(m->context);
-  const size_t slice = 64;
-  bool memory = true;
-  for (size_t first = 0; first < m->part_count; first += slice) {
-    const qmat_status status = qmat_progress(m->context, first, m->part_count, "hulls");
-    if (status != QMAT_OK) return status;
-    const size_t end = first + slice < m->part_count ? first + slice : m->part_count;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : memory)
-    for (size_t i = first; i < end; i++) {
-      m->parts[i].shape = m->parts[i].last = m->following[i] = (uint32_t)i;
-      if (given[i].count == 0) continue;
-      joint *j = &m->joints[omp_get_thread_num()];
-      if (make_part(m, &given[i], false, j, &m->parts[i]) == QMAT_ERROR_MEMORY) memory = false;
-    }
-    if (!memory) return qmat_fail_memory(m->context, "the hulls");
-  }
+  qmat_status status =
+      qmat_run_side_by_side(m->context, m->part_count, make_part_of, m, &m->done, m->part_count, "hulls");
+  end_of_items(m);
+  if (status != QMAT_OK) return status;
   for (size_t i = 0; i < m->part_count; i++) m->live_count += m->parts[i].live;
-  qmat_status status = QMAT_OK;
   for (size_t i = 0; i < m->part_count && m->live_count > 0 && status == QMAT_OK; i++)
     if (!m->parts[i].live && given[i].count > 0) status = move_part(m, given, i);
   return fail(m, status);
@@ -396,30 +412,39 @@ static qmat_status reduce_points(const merging *m, part *p, joint *j) {
              : QMAT_ERROR_MEMORY;
 }
 
+static qmat_status collect_points_of(void *data, qmat_context *context, size_t i) {
+  merging *m = data;
+  qmat_status status = qmat_progress(context, 1, 0, "hulls collected");
+  if (status == QMAT_OK) status = collect_points(m, &m->hulls[i], &m->ends[i]);
+  m->done++;
+  return record(context, status);
+}
+
+static qmat_status reduce_points_of(void *data, qmat_context *context, size_t i) {
+  merging *m = data;
+  const qmat_status status = reduce_points(m, &m->ends[i], joint_of_thread(m, context));
+  m->done++;
+  return record(context, status);
+}
+
 /* Makes the hulls around the pieces in place of the parts. */
 static qmat_status make_hulls(merging *m) {
   const int threads = qmat_threads(m->context);
   const size_t count = m->live_count;
   size_t room = 4;
-  bool done = true;
-  int worst = QMAT_OK; /* a memory shortage comes after spoilt hulls, for any number of threads */
   m->ends = qmat_arena_calloc(&m->context->arena, count + 1, sizeof *m->ends);
   if (!m->ends) return qmat_fail_memory(m->context, "the hulls");
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
-  for (size_t i = 0; i < count; i++)
-    if (collect_points(m, &m->hulls[i], &m->ends[i]) != QMAT_OK) done = false;
+  m->done = 0;
+  qmat_status status =
+      qmat_run_side_by_side(m->context, count, collect_points_of, m, &m->done, count, "hulls collected");
   for (size_t i = 0; i < count; i++) room = m->ends[i].count > room ? m->ends[i].count : room;
-  if (!done) return qmat_fail_memory(m->context, "the hulls");
-  for (int i = 0; i < threads; i++) {
-    const qmat_status status = qmat_outer_hull_init(m->context, room, m->most_points, &m->joints[i].outer);
-    if (status != QMAT_OK) return status;
-  }
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(max : worst)
-  for (size_t i = 0; i < count; i++) {
-    const int status = (int)reduce_points(m, &m->ends[i], &m->joints[omp_get_thread_num()]);
-    worst = status > worst ? status : worst;
-  }
-  return fail(m, (qmat_status)worst);
+  for (int i = 0; i < threads && status == QMAT_OK; i++)
+    status = qmat_outer_hull_init(m->context, room, m->most_points, &m->joints[i].outer);
+  m->done = 0;
+  if (status == QMAT_OK)
+    status = qmat_run_side_by_side(m->context, count, reduce_points_of, m, &m->done, count, "hulls fitted");
+  end_of_items(m);
+  return status;
 }
 
 /* Writes the hulls. */
@@ -474,7 +499,8 @@ qmat_status qmat_hulls_merge(qmat_context *context, const qmat_surface *solid, q
   for (size_t enough = 1; status == QMAT_OK; enough = most, m.limit *= limit_step) {
     status = find_pairs(&m);
     for (pair *p; status == QMAT_OK && m.live_count > enough && (p = best_pair(&m));) {
-      status = fail(&m, test_pair(&m, p, MANY_HALVINGS, &m.joints[0]));
+      status = qmat_progress(context, m.part_count - m.live_count, m.part_count, "hulls joined");
+      if (status == QMAT_OK) status = fail(&m, test_pair(&m, p, MANY_HALVINGS, &m.joints[0]));
       if (status == QMAT_OK && !p->exceeds) status = join_pair(&m, p->a, p->b);
     }
     if (most == 0 || m.live_count <= most || !(m.limit < 1)) break;

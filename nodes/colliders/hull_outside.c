@@ -135,8 +135,14 @@ qmat_status qmat_hulls_protrusion(qmat_context *context, const qmat_surface *sol
   double *points = qmat_arena_alloc(&context->arena, count, 3 * sizeof *points), of_points = 0;
   if (!points) return qmat_fail_memory(context, "points of hulls");
   qmat_frame_to_unit(qmat_surface_frame(solid), colliders->points, count, points);
+  for (size_t first = 0; first < count; first += SLICE) {
+    const size_t end = count - first < SLICE ? count : first + SLICE;
+    const qmat_status status = qmat_progress(context, first, count, "points of hulls measured");
+    if (status != QMAT_OK) return status;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : of_points)
-  for (size_t i = 0; i < count; i++) of_points = fmax(of_points, qmat_surface_signed_distance(solid, &points[3 * i]));
+    for (size_t i = first; i < end; i++)
+      of_points = fmax(of_points, qmat_surface_signed_distance(solid, &points[3 * i]));
+  }
   double most = of_points;
   for (size_t first = 0; first < colliders->triangle_count; first += SLICE) {
     const size_t rest = colliders->triangle_count - first, end = first + (rest < SLICE ? rest : SLICE);

@@ -196,12 +196,19 @@ static void forget(qmat_outer_hull *hull, uint32_t vertex) {
   } while (o != hull->leaving[vertex]);
 }
 
+/* Whether to go on. */
+static qmat_status ask(const qmat_outer_hull *hull) {
+  return hull->context ? qmat_progress(hull->context, 1, 0, "hulls fitted") : QMAT_OK;
+}
+
 /* Moves each vertex by a share of the way to where the volume is least. How much that gains. */
-static double sweep(qmat_outer_hull *hull, double step) {
+static double sweep(qmat_outer_hull *hull, double step, qmat_status *status) {
   double gain = 0;
   for (uint32_t v = 0; v < hull->point_count; v++) {
     uint32_t ring[MOST_AROUND];
     program p;
+    *status = ask(hull);
+    if (*status != QMAT_OK) break;
     if (hull->leaving[v] == none) continue;
     const size_t count = find_ring(hull, v, ring);
     if (count == 0 || !make_program(hull, ring, count, &p)) continue;
@@ -300,7 +307,9 @@ static qmat_status choose(qmat_outer_hull *hull, double error, size_t *triangles
   qmat_growing_hull grown = {0};
   qmat_status status;
   do {
-    status = qmat_growing_hull_of(&grown, hull->points, hull->point_count, hull->triangles, triangles);
+    status = ask(hull);
+    if (status == QMAT_OK)
+      status = qmat_growing_hull_of(&grown, hull->points, hull->point_count, hull->triangles, triangles);
   } while (status == QMAT_OK && add_points(hull, *triangles, error) > 0);
   qmat_growing_hull_uninit(&grown);
   return status;
@@ -318,11 +327,13 @@ static bool take_cloud(qmat_outer_hull *hull, const double *points, double centr
 }
 
 /* Moves the vertices inward, sweep by sweep. */
-static void shrink(qmat_outer_hull *hull, size_t triangles) {
+static qmat_status shrink(qmat_outer_hull *hull, size_t triangles) {
+  qmat_status status = QMAT_OK;
   double volume = 0;
   for (uint32_t t = 0; t < triangles; t++) volume += cone_volume(hull, 3 * t);
-  for (int i = 0; i < MOST_SWEEPS; i++)
-    if (sweep(hull, i < HALF_SWEEPS ? 0.5 : 1) < least_gain * volume && i >= HALF_SWEEPS) break;
+  for (int i = 0; i < MOST_SWEEPS && status == QMAT_OK; i++)
+    if (sweep(hull, i < HALF_SWEEPS ? 0.5 : 1, &status) < least_gain * volume && i >= HALF_SWEEPS) break;
+  return status;
 }
 
 qmat_status qmat_outer_hull_fit(qmat_outer_hull *hull, const double *points, size_t count, double margin,
@@ -337,8 +348,8 @@ qmat_status qmat_outer_hull_fit(qmat_outer_hull *hull, const double *points, siz
   const double growth = find_factor(hull, triangles, 0) * (1 + on_plane);
   if (!isfinite(growth)) return QMAT_ERROR_GEOMETRY;
   for (size_t i = 0; i < 3 * hull->point_count; i++) hull->points[i] *= growth;
-  shrink(hull, triangles);
-  status = qmat_convex_hull(hull->points, hull->point_count, hull->triangles, &triangles);
+  status = shrink(hull, triangles);
+  if (status == QMAT_OK) status = qmat_convex_hull(hull->points, hull->point_count, hull->triangles, &triangles);
   if (status != QMAT_OK) return status;
   if (!(find_factor(hull, triangles, 0) < 1.001)) return QMAT_ERROR_GEOMETRY;
   const double factor = fmax(find_factor(hull, triangles, margin / scale), 1);

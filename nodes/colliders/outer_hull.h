@@ -14,9 +14,11 @@ typedef struct qmat_outer_hull {
   uint32_t *triangles, *twins, *scratch; /* of half-edges: where it begins; the other one of its edge */
   uint32_t *leaving, *farthest;          /* a half-edge of each vertex; a point of each triangle */
   uint8_t *known, *chosen;               /* tangents of half-edges; points */
+  qmat_context *context;                 /* whose progress function is asked on the way; NULL: none */
 } qmat_outer_hull;
 
-/* Takes the arrays from the context's arena. `most` is at least 24, `room` at least 4. QMAT_ERROR_MEMORY. */
+/* Takes the arrays from the context's arena, and asks no progress function. `most` is at least 24, `room` at least 4.
+ * QMAT_ERROR_MEMORY. */
 qmat_status qmat_outer_hull_init(qmat_context *context, size_t room, size_t most, qmat_outer_hull *hull);
 
 /* Finds at most `most` vertices of a convex polyhedron that contains `count` points (3 doubles each, `room` at most)
@@ -28,7 +30,8 @@ qmat_status qmat_outer_hull_init(qmat_context *context, size_t room, size_t most
  * (tangent_hull.h), and a third of the volume beyond it.
  *
  * QMAT_ERROR_GEOMETRY for points near a plane, or where rounding spoils the vertices by more than a thousandth;
- * QMAT_ERROR_MEMORY. Cost: some ten hulls of `most` points, and some 200 times `count` times `most` steps. */
+ * QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: some ten hulls of `most` points, and some 200 times `count` times `most`
+ * steps. */
 qmat_status qmat_outer_hull_fit(qmat_outer_hull *hull, const double *points, size_t count, double margin, double error);
 
 #endif

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/geometry/morton.h"
 #include "core/geometry/vector.h"
 
 enum { MOST_ROWS = 64 };
@@ -218,20 +219,133 @@ static bool holds(const qmat_prepared_shape *outer, const double *spheres, const
   return true;
 }
 
-/* Marks the shapes that are inside another one; of equal ones the first stays. */
-static qmat_status mark_nested(qmat_context *context, const qmat_shape_set *set, uint8_t *dropped) {
-  qmat_prepared_shape *prepared = qmat_arena_alloc(&context->arena, set->shape_count, sizeof *prepared);
-  if (!prepared) return qmat_fail_memory(context, "the colliders");
-  for (size_t i = 0; i < set->shape_count; i++) qmat_shape_prepare(&prepared[i], set->spheres, &set->shapes[3 * i]);
-  for (size_t i = set->shape_count; i-- > 0;) {
-    const uint32_t *ids = &set->shapes[3 * i];
-    const qmat_status status = qmat_progress(context, set->shape_count - i, set->shape_count, "shapes compared");
-    if (status != QMAT_OK) return status;
-    for (size_t j = 0; j < set->shape_count && !dropped[i]; j++)
-      if (j != i && !dropped[j] && qmat_shape_set_same_joint(set, i, j) && holds(&prepared[j], set->spheres, ids))
-        dropped[i] = 1;
+/* A box around a shape is larger by this, so that it holds the centres of all spheres that the shape holds. */
+static const double around_shape = 1e-9;
+
+/* Shapes that hold others. */
+typedef struct nesting {
+  qmat_context *context;
+  const qmat_shape_set *set;
+  qmat_prepared_shape *prepared;
+  uint8_t *dropped;
+  uint32_t *holders; /* pairs: a shape, and a later one that holds it; on the heap */
+  size_t count, capacity;
+  qmat_curve_item *order;
+  double (*boxes)[6];
+  size_t group_count; /* a power of two */
+} nesting;
+
+/* The box of a shape: the least x, y, z, then the largest. */
+static void box_of(const qmat_shape_set *set, size_t shape, double box[6]) {
+  for (int k = 0; k < 3; k++) {
+    double low = INFINITY, high = -INFINITY;
+    for (int c = 0; c < 3; c++) {
+      const double *s = &set->spheres[4 * (size_t)set->shapes[3 * shape + (size_t)c]];
+      low = fmin(low, s[k] - s[3]);
+      high = fmax(high, s[k] + s[3]);
+    }
+    box[k] = low - around_shape;
+    box[3 + k] = high + around_shape;
   }
+}
+
+static const double *centre_of(const qmat_shape_set *set, size_t shape) {
+  return &set->spheres[4 * (size_t)set->shapes[3 * shape]];
+}
+
+/* So many shapes share a box of their centres. */
+enum { GROUP_SIZE = 8 };
+
+/* Makes the tree: shapes along a curve through their first centres, and the boxes of groups of them. Node 1 is the
+ * root; the children of k are 2 k and 2 k + 1. */
+static bool make_groups(nesting *n) {
+  const size_t count = n->set->shape_count;
+  n->group_count = 1;
+  while (n->group_count * GROUP_SIZE < count) n->group_count *= 2;
+  n->order = qmat_arena_alloc(&n->context->arena, count, sizeof *n->order);
+  n->boxes = qmat_arena_alloc(&n->context->arena, 2 * n->group_count, sizeof *n->boxes);
+  if (!n->order || !n->boxes) return false;
+  for (size_t i = 0; i < count; i++)
+    n->order[i] = (qmat_curve_item){qmat_curve_code(centre_of(n->set, i)), (uint32_t)i};
+  qmat_curve_sort(n->order, count);
+  for (size_t g = 2 * n->group_count; g-- > 1;)
+    for (size_t k = 0; k < 3; k++) {
+      double low = INFINITY, high = -INFINITY;
+      for (size_t c = 0; c < 2 && g < n->group_count; c++) {
+        low = fmin(low, n->boxes[2 * g + c][k]);
+        high = fmax(high, n->boxes[2 * g + c][3 + k]);
+      }
+      const size_t first = (g - n->group_count) * GROUP_SIZE;
+      for (size_t i = first; g >= n->group_count && i < first + GROUP_SIZE && i < count; i++) {
+        low = fmin(low, centre_of(n->set, n->order[i].id)[k]);
+        high = fmax(high, centre_of(n->set, n->order[i].id)[k]);
+      }
+      n->boxes[g][k] = low;
+      n->boxes[g][3 + k] = high;
+    }
+  return true;
+}
+
+/* Looks whether a shape whose box may hold the centre of another one holds it all. */
+static qmat_status note_holder(nesting *n, uint32_t inner, uint32_t outer) {
+  if (inner == outer || n->dropped[inner]) return QMAT_OK;
+  if (!qmat_shape_set_same_joint(n->set, inner, outer) ||
+      !holds(&n->prepared[outer], n->set->spheres, &n->set->shapes[3 * (size_t)inner]))
+    return QMAT_OK;
+  if (outer < inner) {
+    n->dropped[inner] = 1; /* later ones are dropped first */
+    return QMAT_OK;
+  }
+  if (qmat_grow((void **)&n->holders, &n->capacity, 2 * n->count + 2, sizeof *n->holders) != 0)
+    return qmat_fail_memory(n->context, "the colliders");
+  n->holders[2 * n->count] = inner;
+  n->holders[2 * n->count++ + 1] = outer;
   return QMAT_OK;
+}
+
+/* Tests the shapes below a node whose centres may be in the box of shape `outer`. */
+static qmat_status search_group(nesting *n, size_t node, const double box[6], uint32_t outer) {
+  const double *own = n->boxes[node];
+  for (int k = 0; k < 3; k++)
+    if (own[k] > box[3 + k] || own[3 + k] < box[k]) return QMAT_OK;
+  qmat_status status = QMAT_OK;
+  if (node < n->group_count) {
+    for (size_t c = 0; c < 2 && status == QMAT_OK; c++) status = search_group(n, 2 * node + c, box, outer);
+    return status;
+  }
+  const size_t first = (node - n->group_count) * GROUP_SIZE;
+  for (size_t i = first; i < first + GROUP_SIZE && i < n->set->shape_count && status == QMAT_OK; i++)
+    status = note_holder(n, n->order[i].id, outer);
+  return status;
+}
+
+static int compare_holders(const void *left, const void *right) {
+  const uint32_t *a = left, *b = right;
+  if (a[0] != b[0]) return a[0] > b[0] ? -1 : 1;
+  return (a[1] > b[1]) - (a[1] < b[1]);
+}
+
+/* Marks the shapes that are inside another one; of equal ones the first stays. The last is looked at first: one that is
+ * dropped holds no other. */
+static qmat_status mark_nested(qmat_context *context, const qmat_shape_set *set, uint8_t *dropped) {
+  const size_t count = set->shape_count;
+  nesting n = {.context = context, .set = set, .dropped = dropped};
+  if (count < 2) return QMAT_OK;
+  n.prepared = qmat_arena_alloc(&context->arena, count, sizeof *n.prepared);
+  if (!n.prepared || !make_groups(&n)) return qmat_fail_memory(context, "the colliders");
+  for (size_t i = 0; i < count; i++) qmat_shape_prepare(&n.prepared[i], set->spheres, &set->shapes[3 * i]);
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+    double box[6];
+    box_of(set, i, box);
+    status = qmat_progress(context, i, count, "shapes compared");
+    if (status == QMAT_OK) status = search_group(&n, 1, box, (uint32_t)i);
+  }
+  if (status == QMAT_OK && n.count > 0) qsort(n.holders, n.count, 2 * sizeof *n.holders, compare_holders);
+  for (size_t i = 0; i < n.count && status == QMAT_OK; i++)
+    if (!dropped[n.holders[2 * i + 1]]) dropped[n.holders[2 * i]] = 1;
+  qmat_free(n.holders);
+  return status;
 }
 
 qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set) {

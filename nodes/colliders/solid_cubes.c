@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <omp.h>
+#include <stdatomic.h>
 #include <string.h>
 
 #include "core/geometry/convex_polygon.h"
@@ -185,6 +186,7 @@ qmat_status qmat_solid_cubes_search(qmat_context *context, const qmat_surface *s
   uint32_t *all = qmat_arena_alloc(&context->arena, count, sizeof *all);
   uint32_t *stacks = qmat_arena_alloc(&context->arena, (size_t)threads, room * sizeof *stacks);
   double *near = qmat_arena_alloc(&context->arena, (size_t)threads, count * sizeof *near);
+  atomic_bool stopped = false;
   char *found = qmat_arena_alloc(&context->arena, SLICE, visitor->region_size);
   if (!shapes || !all || !stacks || !near || !found) return qmat_fail_memory(context, visitor->what);
   for (size_t i = 0; i < count; i++) {
@@ -197,8 +199,10 @@ qmat_status qmat_solid_cubes_search(qmat_context *context, const qmat_surface *s
     memset(found, 0, SLICE * visitor->region_size);
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
     for (size_t i = first; i < first + SLICE; i++) {
-      if (visitor->skipped && visitor->skipped[i]) continue;
       const size_t thread = (size_t)omp_get_thread_num();
+      if (thread == 0 && !atomic_load(&stopped)) /* the thread that runs the node */
+        atomic_store(&stopped, qmat_progress(context, i, regions, visitor->what) != QMAT_OK);
+      if (atomic_load(&stopped) || (visitor->skipped && visitor->skipped[i])) continue;
       qmat_cube_search s = {.surface = surface,
                             .positions = qmat_surface_positions(surface),
                             .triangles = qmat_surface_mesh(surface)->triangles,
@@ -211,6 +215,7 @@ qmat_status qmat_solid_cubes_search(qmat_context *context, const qmat_surface *s
                             .region = found + (i - first) * visitor->region_size};
       search_region(&s, &b, i, all, count);
     }
+    if (atomic_load(&stopped)) status = QMAT_CANCELLED;
     for (size_t i = 0; i < SLICE; i++)
       if (visitor->gather(visitor->all, found + i * visitor->region_size) != QMAT_OK && status == QMAT_OK)
         status = qmat_fail_memory(context, visitor->what);

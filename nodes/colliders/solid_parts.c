@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/geometry/sheets.h"
+#include "core/side_by_side.h"
 #include "nodes/colliders/extreme_points.h"
 #include "nodes/colliders/solid_cubes.h"
 
@@ -38,9 +39,10 @@ typedef struct region {
 
 /* What the search fills. */
 typedef struct gathered {
-  heap *heaps;        /* one per shape */
-  size_t solid_count; /* the triangles from here on are sheets */
-  double reach;       /* of the octahedra around the points of sheets */
+  heap *heaps;         /* one per shape */
+  size_t solid_count;  /* the triangles from here on are sheets */
+  double reach;        /* of the octahedra around the points of sheets */
+  _Atomic size_t done; /* shapes whose points are reduced */
 } gathered;
 
 static heap *find_heap(region *r, uint32_t shape) {
@@ -192,10 +194,19 @@ static qmat_status gather(void *data, void *found) {
   return done ? QMAT_OK : QMAT_ERROR_MEMORY;
 }
 
+static qmat_status keep_points(void *data, qmat_context *context, size_t shape) {
+  gathered *all = data;
+  qmat_point_heap *hull = &all->heaps[shape].hull;
+  qmat_status status = qmat_progress(context, 1, 0, "parts");
+  if (status == QMAT_OK && qmat_extreme_points_keep(hull->points, &hull->count, qmat_solid_dropped) != QMAT_OK)
+    status = qmat_fail_memory(context, "the parts of the solid");
+  all->done++;
+  return status;
+}
+
 qmat_status qmat_solid_parts_find(qmat_context *context, const qmat_surface *surface, const qmat_shape_set *set,
                                   double sheet_reach, qmat_solid_part **parts) {
   const size_t count = set->shape_count;
-  const int threads = qmat_threads(context);
   const qmat_mesh *mesh = qmat_surface_mesh(surface);
   gathered all = {.heaps = qmat_arena_calloc(&context->arena, count, sizeof *all.heaps),
                   .solid_count = qmat_solid_triangle_count(mesh),
@@ -209,14 +220,12 @@ qmat_status qmat_solid_parts_find(qmat_context *context, const qmat_surface *sur
                                      .all = &all,
                                      .what = "regions divided"};
   qmat_status status = qmat_solid_cubes_search(context, surface, set, &visitor);
-  bool done = status == QMAT_OK;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(&& : done)
+  if (status == QMAT_OK) status = qmat_run_side_by_side(context, count, keep_points, &all, &all.done, count, "parts");
   for (size_t i = 0; i < count; i++) {
-    heap *h = &all.heaps[i];
-    if (done && qmat_extreme_points_keep(h->hull.points, &h->hull.count, qmat_solid_dropped) != QMAT_OK) done = false;
+    const heap *h = &all.heaps[i];
     (*parts)[i] = (qmat_solid_part){h->hull.count, h->cell_count, h->hull.points, h->cells, h->cell_points, 0};
   }
-  return status != QMAT_OK || done ? status : qmat_fail_memory(context, "the parts of the solid");
+  return status;
 }
 
 /* A point of a joint, and the shape and the cell that it goes to. */

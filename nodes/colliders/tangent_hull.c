@@ -180,11 +180,19 @@ static qmat_status finish(qmat_tangent_hull *h, const target *t) {
   return QMAT_OK;
 }
 
+/* Whether to go on. */
+static qmat_status ask(const qmat_tangent_hull *hull) {
+  return hull->context ? qmat_progress(hull->context, 1, 0, "hulls fitted") : QMAT_OK;
+}
+
 /* Adds planes until none is worth it. */
 static qmat_status surround(qmat_tangent_hull *hull, const target *t, double error) {
   const size_t most_planes = hull->most / 2 + 2; /* they meet in 2 planes - 4 vertices at most */
   qmat_status status = meet(hull);
-  while (status == QMAT_OK && refine(hull, t, error, most_planes) > 0) status = meet(hull);
+  while (status == QMAT_OK && refine(hull, t, error, most_planes) > 0) {
+    status = ask(hull);
+    if (status == QMAT_OK) status = meet(hull);
+  }
   return status == QMAT_OK ? finish(hull, t) : status;
 }
 
@@ -198,20 +206,21 @@ qmat_status qmat_tangent_hull_fit(qmat_tangent_hull *hull, const double *spheres
 }
 
 /* The planes of the facets of the cloud's hull, from the centre of its points: `t->facets`. */
-static qmat_status find_facets(target *t, uint32_t *triangles, double *facets) {
+static qmat_status find_facets(const qmat_tangent_hull *hull, target *t, uint32_t *triangles, double *facets) {
   size_t count;
-  const qmat_status status = qmat_convex_hull(t->cloud, t->point_count, triangles, &count);
+  qmat_status status = qmat_convex_hull(t->cloud, t->point_count, triangles, &count);
   if (status != QMAT_OK) return status;
   for (size_t i = 0; i < t->point_count; i++)
     for (int k = 0; k < 3; k++) t->centre[k] += t->cloud[3 * i + (size_t)k] / (double)t->point_count;
-  for (size_t i = 0; i < count; i++) {
+  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
     double *facet = &facets[4 * t->facet_count];
     if (!qmat_hull_plane(t->cloud, &triangles[3 * i], facet)) continue;
     facet[3] = reach(t, facet);
     t->facet_count++;
+    status = ask(hull);
   }
   t->facets = facets;
-  return QMAT_OK;
+  return status;
 }
 
 qmat_status qmat_tangent_hull_fit_points(qmat_tangent_hull *hull, const double *points, size_t count, double margin,
@@ -220,7 +229,7 @@ qmat_status qmat_tangent_hull_fit_points(qmat_tangent_hull *hull, const double *
   uint32_t *triangles = qmat_alloc(count, 6 * sizeof *triangles);
   double *facets = qmat_alloc(count, 8 * sizeof *facets);
   qmat_status status = triangles && facets ? QMAT_OK : QMAT_ERROR_MEMORY;
-  if (status == QMAT_OK) status = count < 4 ? QMAT_ERROR_GEOMETRY : find_facets(&t, triangles, facets);
+  if (status == QMAT_OK) status = count < 4 ? QMAT_ERROR_GEOMETRY : find_facets(hull, &t, triangles, facets);
   if (status == QMAT_OK) {
     hull->plane_count = 0;
     for (int i = 0; i < 6; i++) add_plane(hull, &t, directions[i]);

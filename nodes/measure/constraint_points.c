@@ -339,30 +339,42 @@ typedef struct {
   witness *witnesses;
 } shell_points;
 
-/* One point of the shell is kept in each cube whose side is this share of epsilon. */
+/* One point of the shell is kept in each cube whose side is this share of the spacing. */
 static const double shell_share = 0.6;
+
+/* The grids of the shell may have this many times the points of those on the surface, before cubes thin them out. */
+enum { SHELL_FACTOR = 4 };
 
 /* The depth of the shell as a share of epsilon; the margin covers the envelope between its points. */
 static const double shell_depth = 0.98;
 
-/* Places a point `depth` below each point of the facets' grids, and below the facets' centres; 3 doubles each. */
-static qmat_status place_shell(qmat_context *context, const qmat_mesh *mesh, const double *positions, double epsilon,
-                               double depth, double **below, size_t *count) {
+/* Places a point `depth` below each point of the facets' grids, and below the facets' centres; 3 doubles each, in
+ * `scratch`. `*spacing` grows until the grids have at most `most` points: the depth stays, so a point asks for no less
+ * than before, and what is between is measured afterwards as ever. */
+static qmat_status place_shell(qmat_context *context, const qmat_mesh *mesh, const double *positions, double depth,
+                               size_t most, qmat_arena *scratch, double *spacing, double **below, size_t *count) {
   const size_t facets = qmat_solid_triangle_count(mesh);
-  size_t capacity = 0;
+  size_t on_grids;
   *count = 0;
-  for (size_t t = 0; t < facets; t++) {
-    const grid g = grid_of(positions, &mesh->triangles[3 * t], epsilon);
-    capacity += grid_points(&g) + 1;
+  for (;; *spacing *= 1.25) {
+    const qmat_status status = qmat_progress(context, 0, 0, "constraint points");
+    if (status != QMAT_OK) return status;
+    on_grids = 0;
+    for (size_t t = 0; t < facets; t++) {
+      const grid g = grid_of(positions, &mesh->triangles[3 * t], *spacing);
+      on_grids += grid_points(&g);
+    }
+    if (on_grids <= most) break;
   }
-  *below = qmat_arena_alloc(&context->arena, capacity, 3 * sizeof **below);
-  if (!*below || capacity >= QMAT_NONE) return qmat_fail_memory(context, "constraint points");
+  const size_t capacity = on_grids + facets;
+  *below = capacity < QMAT_NONE ? qmat_arena_alloc(scratch, capacity, 3 * sizeof **below) : NULL;
+  if (!*below) return qmat_fail_memory(context, "constraint points");
   for (size_t t = 0; t < facets; t++) {
     if (t % SLICE == 0) {
       const qmat_status status = qmat_progress(context, t, facets, "constraint points");
       if (status != QMAT_OK) return status;
     }
-    const grid g = grid_of(positions, &mesh->triangles[3 * t], epsilon);
+    const grid g = grid_of(positions, &mesh->triangles[3 * t], *spacing);
     double normal[3];
     if (!(qmat_triangle_area(g.corners[0], g.corners[1], g.corners[2], normal) > 0)) continue;
     const size_t on_grid = grid_points(&g);
@@ -376,24 +388,43 @@ static qmat_status place_shell(qmat_context *context, const qmat_mesh *mesh, con
   return QMAT_OK;
 }
 
+/* Spreads points at a depth below the surface: one in each cube. How many there are. */
+static qmat_status spread_shell(qmat_context *context, const qmat_surface *surface, double epsilon, size_t most,
+                                double **points, size_t *kept) {
+  qmat_arena scratch = {0};
+  double *below, spacing = epsilon;
+  size_t count;
+  const size_t most_on_grids = most < SIZE_MAX / SHELL_FACTOR ? SHELL_FACTOR * most : SIZE_MAX;
+  qmat_status status = place_shell(context, qmat_surface_mesh(surface), qmat_surface_positions(surface),
+                                   shell_depth * epsilon, most_on_grids, &scratch, &spacing, &below, &count);
+  if (status == QMAT_OK) {
+    const cube_point *sorted = sort_into_cubes(&scratch, below, count, shell_share * spacing);
+    *kept = 0;
+    for (size_t i = 0; sorted && i < count; i++) *kept += is_first(sorted, i);
+    *points = qmat_arena_alloc(&context->arena, *kept, 3 * sizeof **points);
+    if (!sorted || !*points) status = qmat_fail_memory(context, "constraint points");
+    double *next = *points;
+    for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+      if (!is_first(sorted, i)) continue;
+      memcpy(next, &below[3 * (size_t)sorted[i].id], 3 * sizeof *below);
+      next += 3;
+    }
+  }
+  qmat_arena_uninit(&scratch);
+  return status;
+}
+
 /* Spreads points almost epsilon below the surface, wherever the solid is thick enough and the initial medial mesh
- * contains them. An envelope that contains all of them leaves no cavity deeper than epsilon. No solid is as thick as an
- * infinite epsilon. */
+ * contains them. An envelope that contains all of them leaves no cavity deeper than epsilon, where their spacing is
+ * epsilon; grids have at most some times `most` points. No solid is as thick as an infinite epsilon. */
 static qmat_status find_shell(qmat_context *context, const qmat_surface *surface, const regions *a, double epsilon,
-                              shell_points *shell) {
+                              size_t most, shell_points *shell) {
   qmat_arena *arena = &context->arena;
   const double depth = shell_depth * epsilon;
-  double *below;
-  size_t count, kept = 0;
+  size_t kept;
   if (isinf(epsilon)) return QMAT_OK;
-  const qmat_status placed =
-      place_shell(context, a->mesh, qmat_surface_positions(surface), epsilon, depth, &below, &count);
+  const qmat_status placed = spread_shell(context, surface, epsilon, most, &shell->points, &kept);
   if (placed != QMAT_OK) return placed;
-  const cube_point *sorted = sort_into_cubes(arena, below, count, shell_share * epsilon);
-  shell->points = qmat_arena_alloc(arena, count, 3 * sizeof *shell->points);
-  if (!sorted || !shell->points) return qmat_fail_memory(context, "constraint points");
-  for (size_t i = 0; i < count; i++)
-    if (is_first(sorted, i)) memcpy(&shell->points[3 * kept++], &below[3 * (size_t)sorted[i].id], 3 * sizeof *below);
   shell->witnesses = qmat_arena_alloc(arena, kept, sizeof *shell->witnesses);
   if (!shell->witnesses) return qmat_fail_memory(context, "constraint points");
   const int threads = qmat_threads(context);
@@ -553,7 +584,7 @@ qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surfac
   qmat_status status = answering_init(context, &request, medial, complex, &a);
   if (status == QMAT_OK && inside) status = qmat_interior_points_find(context, complex, epsilon, &inner);
   shell_points shell = {.count = 0};
-  if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, &shell);
+  if (status == QMAT_OK && inside) status = find_shell(context, surface, &a, epsilon, most, &shell);
   if (status == QMAT_OK) status = place_points(context, &request, &places);
   if (status != QMAT_OK) return status;
   if (epsilon < INFINITY) status = thin_out(context, epsilon, &places, constraints);

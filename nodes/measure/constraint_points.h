@@ -38,9 +38,9 @@ enum { QMAT_MOST_CONSTRAINT_POINTS = 600000 };
 
 /* Makes the constraint points for a medial mesh `complex` (unit frame) that is not yet changed. `medial` gives the
  * responsible regions; where they are empty the envelope is searched. `epsilon` is the error to enforce (unit frame, >
- * 0; INFINITY: samples only). Grids add at most `most` points; their spacing grows until they do. With `inside`, points
- * inside the solid are added where the medial mesh contains them. QMAT_ERROR_MEMORY; QMAT_ERROR_GEOMETRY where the
- * medial mesh belongs to other samples. Uses all threads. */
+ * 0; INFINITY: samples only). Grids add at most `most` points, and those of the shell at most four times as many; their
+ * spacing grows until they do. With `inside`, points inside the solid are added where the medial mesh contains them.
+ * QMAT_ERROR_MEMORY; QMAT_ERROR_GEOMETRY where the medial mesh belongs to other samples. Uses all threads. */
 qmat_status qmat_constraint_points_make(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                         const qmat_medial *medial, const qmat_complex *complex, double epsilon,
                                         size_t most, bool inside, qmat_constraint_points *constraints);

@@ -7,30 +7,42 @@
 #include "nodes/measure/boundary_distance.h"
 #include "nodes/measure/envelope_to_surface.h"
 
+/* Queries between two calls of the progress function. */
+enum { POINTS_SLICE = 1 << 14 };
+
 /* The largest r - depth at the spheres and at the middles of the primitives: a lower bound, after which most primitives
  * need a single query. */
-static double sampled_to_surface(const qmat_surface *surface, const qmat_medial *unit, const qmat_envelope *envelope,
-                                 int threads) {
-  const size_t primitives = qmat_envelope_primitive_count(envelope);
+static qmat_status sampled_to_surface(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
+                                      const qmat_envelope *envelope, double *result) {
+  const int threads = qmat_threads(context);
+  const size_t all = unit->sphere_count + qmat_envelope_primitive_count(envelope);
   double least = 0;
+  for (size_t first = 0; first < all; first += POINTS_SLICE) {
+    const qmat_status status = qmat_progress(context, first, all, "primitives sampled");
+    if (status != QMAT_OK) return status;
+    const size_t last = all - first < POINTS_SLICE ? all : first + POINTS_SLICE;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64) reduction(max : least)
-  for (size_t i = 0; i < unit->sphere_count + primitives; i++) {
-    double middle[4] = {0, 0, 0, 0};
-    uint32_t ids[3] = {(uint32_t)i};
-    const int count = i < unit->sphere_count ? 1 : qmat_envelope_primitive(envelope, i - unit->sphere_count, ids);
-    for (int c = 0; c < count; c++)
-      for (size_t k = 0; k < 4; k++) middle[k] += unit->spheres[4 * (size_t)ids[c] + k] / count;
-    least = fmax(least, qmat_envelope_to_surface_of_sphere(surface, middle));
+    for (size_t i = first; i < last; i++) {
+      double middle[4] = {0, 0, 0, 0};
+      uint32_t ids[3] = {(uint32_t)i};
+      const int count = i < unit->sphere_count ? 1 : qmat_envelope_primitive(envelope, i - unit->sphere_count, ids);
+      for (int c = 0; c < count; c++)
+        for (size_t k = 0; k < 4; k++) middle[k] += unit->spheres[4 * (size_t)ids[c] + k] / count;
+      least = fmax(least, qmat_envelope_to_surface_of_sphere(surface, middle));
+    }
   }
-  return least;
+  *result = least;
+  return QMAT_OK;
 }
 
 static qmat_status largest_to_surface(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
                                       const qmat_envelope *envelope, double tolerance, double enough, double *result) {
   const int threads = qmat_threads(context);
   const size_t primitives = qmat_envelope_primitive_count(envelope), slice = 256;
-  enough = fmax(enough, sampled_to_surface(surface, unit, envelope, threads) + tolerance);
-  double largest = 0;
+  double largest = 0, sampled;
+  const qmat_status of_samples = sampled_to_surface(context, surface, unit, envelope, &sampled);
+  if (of_samples != QMAT_OK) return of_samples;
+  enough = fmax(enough, sampled + tolerance);
   for (size_t first = 0; first < primitives; first += slice) {
     const qmat_status status = qmat_progress(context, first, primitives, "primitives measured");
     if (status != QMAT_OK) return status;
@@ -60,13 +72,19 @@ qmat_status qmat_medial_surface_bound_measure(qmat_context *context, const qmat_
   if (status != QMAT_OK) return status;
   const int threads = qmat_threads(context);
   double farthest = enough;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 256) reduction(max : farthest)
-  for (size_t i = 0; i < point_count; i += POINT_STRIDE)
-    farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * i], NULL));
+  const size_t queries = (point_count + POINT_STRIDE - 1) / POINT_STRIDE;
+  for (size_t first = 0; first < queries && status == QMAT_OK; first += POINTS_SLICE) {
+    const size_t last = queries - first < POINTS_SLICE ? queries : first + POINTS_SLICE;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 32) reduction(max : farthest)
+    for (size_t i = first; i < last; i++)
+      farthest = fmax(farthest, qmat_envelope_distance(envelope, &points[3 * POINT_STRIDE * i], NULL));
+    status = qmat_progress(context, last, queries, "points measured");
+  }
   /* Where a point exceeds the threshold, the facets beyond it are still to show their worst points. */
   farthest = fmin(farthest, fmax(threshold, enough));
-  status = qmat_hausdorff_bound_measure(context, surface, envelope, farthest, tolerance, threshold - tolerance,
-                                        threshold, &errors->bound);
+  if (status == QMAT_OK)
+    status = qmat_hausdorff_bound_measure(context, surface, envelope, farthest, tolerance, threshold - tolerance,
+                                          threshold, &errors->bound);
   errors->surface_to_envelope = errors->bound.bound;
   qmat_envelope_free(envelope);
   return status;
@@ -116,6 +134,5 @@ qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surfa
 void qmat_medial_errors_uninit(qmat_medial_errors *errors) {
   qmat_free(errors->uncovered);
   qmat_free(errors->undecided);
-  errors->uncovered = errors->undecided = NULL;
-  errors->uncovered_count = errors->undecided_count = 0;
+  *errors = (qmat_medial_errors){0};
 }

@@ -39,7 +39,7 @@ qmat_status qmat_medial_envelope_bound_measure(qmat_context *context, const qmat
 qmat_status qmat_medial_boundary_measure(qmat_context *context, const qmat_surface *surface, const qmat_medial *unit,
                                          double epsilon, bool only_places, qmat_medial_errors *errors);
 
-/* Frees the points. */
+/* Frees the points, and sets all to 0: nothing is measured. */
 void qmat_medial_errors_uninit(qmat_medial_errors *errors);
 
 #endif

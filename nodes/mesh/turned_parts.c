@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "core/geometry/triangle.h"
+#include "core/geometry/winding_tree.h"
 #include "nodes/mesh/box_pairs_cgal.h"
 
 /* Points are so far outside of a part, in diagonals: more than planes that should be one are apart by rounding. */
@@ -34,6 +35,7 @@ typedef struct turner {
   uint32_t *slots;   /* per part: its box */
   neighbours *pairs; /* on the heap */
   size_t pair_count, pair_capacity;
+  qmat_winding_tree **trees; /* per part; NULL: few triangles, or nothing is near it */
 } turner;
 
 static qmat_status fail_shortage(const turner *t) {
@@ -121,36 +123,111 @@ static size_t choose_points(const turner *t, const qmat_part *part, placed_trian
   return count;
 }
 
-/* Whether the others are wound around a point. */
-static bool is_wound(const turner *t, const neighbours *others, size_t count, const double *point) {
+/* ---- winding numbers ---- */
+
+/* Parts with more triangles than this are asked through a tree. */
+enum { MOST_SUMMED = 256 };
+/* So near to one half a tree decides nothing, and triangles are summed. */
+static const double near_half = 0.1;
+/* Parts, and undecided points, between two calls of the progress function. */
+enum { SLICE = 64, SUMMED_SLICE = 8 };
+
+/* Parts that are tested together, and their points, one after the other. */
+typedef struct batch {
+  size_t first_pair[SLICE + 1]; /* pairs by part */
+  size_t first_point[SLICE + 1];
+  size_t part_count, undecided_count;
+  double points[SLICE * POINTS][3];
+  uint8_t wound[SLICE * POINTS];
+  uint16_t part_of[SLICE * POINTS], undecided[SLICE * POINTS];
+} batch;
+
+static qmat_status make_trees(turner *t) {
+  t->trees = qmat_arena_calloc(&t->context->arena, t->parts->part_count, sizeof *t->trees);
+  if (!t->trees) return fail_shortage(t);
+  qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < t->pair_count && status == QMAT_OK; i++) {
+    const uint32_t other = t->pairs[i].other;
+    const qmat_part *part = &t->parts->parts[other];
+    if (part->triangle_count <= MOST_SUMMED || t->trees[other]) continue;
+    status = qmat_winding_tree_new(t->context, t->parts->positions, t->parts->triangles,
+                                   t->parts->members + part->first_member, part->triangle_count, &t->trees[other]);
+  }
+  return status;
+}
+
+static double summed_winding(const turner *t, const qmat_part *part, const double *point) {
+  double winding = 0;
+  for (size_t m = part->first_member; m < part->first_member + part->triangle_count; m++) {
+    const uint32_t triangle = t->parts->members[m];
+    winding += qmat_seen_share(point, corner(t, triangle, 0), corner(t, triangle, 1), corner(t, triangle, 2));
+  }
+  return winding;
+}
+
+/* How often the others are wound around a point. */
+static double winding_of(const turner *t, const neighbours *others, size_t count, const double *point, bool summed) {
   double winding = 0;
   for (size_t i = 0; i < count; i++) {
-    const double *box = t->boxes + 6 * (size_t)t->slots[others[i].other];
-    const qmat_part *part = &t->parts->parts[others[i].other];
+    const uint32_t other = others[i].other;
+    const double *box = t->boxes + 6 * (size_t)t->slots[other];
     if (point[0] < box[0] || point[1] < box[1] || point[2] < box[2] || point[0] > box[3] || point[1] > box[4] ||
         point[2] > box[5])
       continue;
-    for (size_t m = part->first_member; m < part->first_member + part->triangle_count; m++) {
-      const uint32_t triangle = t->parts->members[m];
-      winding += qmat_seen_share(point, corner(t, triangle, 0), corner(t, triangle, 1), corner(t, triangle, 2));
-    }
+    winding += summed || !t->trees[other] ? summed_winding(t, &t->parts->parts[other], point)
+                                          : qmat_winding_tree_number(t->trees[other], point);
   }
-  return fabs(winding) > 0.5;
+  return fabs(winding);
+}
+
+static double winding_at(const turner *t, const batch *b, size_t point, bool summed) {
+  const size_t *pairs = b->first_pair + b->part_of[point];
+  return winding_of(t, t->pairs + pairs[0], pairs[1] - pairs[0], b->points[point], summed);
+}
+
+static qmat_status test_points(const turner *t, batch *b) {
+  const int threads = qmat_threads(t->context);
+  const size_t count = b->first_point[b->part_count];
+  double winding[SLICE * POINTS];
+#pragma omp parallel for num_threads(threads) schedule(dynamic)
+  for (size_t i = 0; i < count; i++) winding[i] = winding_at(t, b, i, false);
+  b->undecided_count = 0;
+  for (size_t i = 0; i < count; i++) {
+    b->wound[i] = winding[i] > 0.5;
+    if (fabs(winding[i] - 0.5) < near_half) b->undecided[b->undecided_count++] = (uint16_t)i;
+  }
+  qmat_status status = QMAT_OK;
+  for (size_t first = 0; first < b->undecided_count && status == QMAT_OK; first += SUMMED_SLICE) {
+    const size_t end = first + SUMMED_SLICE < b->undecided_count ? first + SUMMED_SLICE : b->undecided_count;
+#pragma omp parallel for num_threads(threads) schedule(dynamic)
+    for (size_t i = first; i < end; i++) b->wound[b->undecided[i]] = winding_at(t, b, b->undecided[i], true) > 0.5;
+    status = qmat_progress(t->context, b->first_pair[0], t->pair_count, "parts");
+  }
+  return status;
+}
+
+/* The next parts and their points. */
+static void fill_batch(const turner *t, size_t first, placed_triangle *places, batch *b) {
+  size_t pair = first, points = 0, i = 0;
+  for (; i < SLICE && pair < t->pair_count; i++) {
+    const uint32_t part = t->pairs[pair].part;
+    b->first_pair[i] = pair;
+    b->first_point[i] = points;
+    const size_t count = choose_points(t, &t->parts->parts[part], places, b->points + points);
+    for (const size_t end = points + count; points < end; points++) b->part_of[points] = (uint16_t)i;
+    while (pair < t->pair_count && t->pairs[pair].part == part) pair++;
+  }
+  b->part_count = i;
+  b->first_pair[i] = pair;
+  b->first_point[i] = points;
 }
 
 /* Whether the others are wound around most points of a part. */
-static bool is_within(const turner *t, const neighbours *others, size_t count, placed_triangle *places) {
-  double points[POINTS][3];
-  const size_t point_count = choose_points(t, &t->parts->parts[others[0].part], places, points);
-  size_t within = 0, without = 0;
-  for (size_t i = 0; i < point_count && 2 * within <= point_count && 2 * without <= point_count; i++) {
-    const size_t next = i * 4 % point_count; /* spread over the part */
-    if (is_wound(t, others, count, points[point_count == POINTS ? next : i]))
-      within++;
-    else
-      without++;
-  }
-  return within > without;
+static bool is_within(const batch *b, size_t part) {
+  size_t within = 0;
+  const size_t first = b->first_point[part], end = b->first_point[part + 1];
+  for (size_t i = first; i < end; i++) within += b->wound[i];
+  return 2 * within > end - first;
 }
 
 static qmat_status test_parts(turner *t, uint8_t *facing) {
@@ -162,16 +239,21 @@ static qmat_status test_parts(turner *t, uint8_t *facing) {
   }
   if (t->pair_count == 0) return QMAT_OK;
   placed_triangle *places = qmat_arena_alloc(&t->context->arena, most, sizeof *places);
-  if (!places) return fail_shortage(t);
+  batch *b = qmat_arena_alloc(&t->context->arena, 1, sizeof *b);
+  if (!places || !b) return fail_shortage(t);
   qsort(t->pairs, t->pair_count, sizeof *t->pairs, compare_pairs);
-  for (size_t first = 0, last; first < t->pair_count; first = last) {
-    const uint32_t part = t->pairs[first].part;
-    const qmat_status status = qmat_progress(t->context, first, t->pair_count, "parts");
-    if (status != QMAT_OK) return status;
-    for (last = first; last < t->pair_count && t->pairs[last].part == part;) last++;
-    if (is_within(t, t->pairs + first, last - first, places)) facing[part] = QMAT_FACING_CAVITY;
+  qmat_status status = make_trees(t);
+  for (size_t first = 0; first < t->pair_count && status == QMAT_OK; first = b->first_pair[b->part_count]) {
+    status = qmat_progress(t->context, first, t->pair_count, "parts");
+    if (status != QMAT_OK) break;
+    fill_batch(t, first, places, b);
+    status = test_points(t, b);
+    if (status != QMAT_OK) break;
+    for (size_t i = 0; i < b->part_count; i++)
+      if (is_within(b, i)) facing[t->pairs[b->first_pair[i]].part] = QMAT_FACING_CAVITY;
   }
-  return QMAT_OK;
+  for (size_t i = 0; t->trees && i < t->parts->part_count; i++) qmat_winding_tree_free(t->trees[i]);
+  return status;
 }
 
 qmat_status qmat_find_turned_parts(qmat_context *context, const qmat_parts *parts, uint8_t *facing) {

@@ -14,8 +14,9 @@ typedef enum qmat_facing {
 /* Sets facing[i] (zeroed, part_count) to a qmat_facing. A solid part of a volume below 0 faces inwards. It is a cavity
  * where the other solid parts are wound around most of its surface: at points just outside of it, so that what touches
  * it from inside makes no difference. The order of the triangles makes none either. `parts->positions` are in a unit
- * frame. QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY, QMAT_CANCELLED. One thread. Cost: n log n, and for each part that
- * faces inwards at most 15 solid angles of all triangles of the parts whose boxes hold points of it. */
+ * frame. QMAT_ERROR_MEMORY, QMAT_ERROR_DEPENDENCY, QMAT_CANCELLED. Threads: the context's. Cost: n log n, and for each
+ * part that faces inwards and each part whose box holds points of it 15 queries of a winding number tree; where these
+ * leave a point undecided, the solid angles of all triangles of the other part. */
 qmat_status qmat_find_turned_parts(qmat_context *context, const qmat_parts *parts, uint8_t *facing);
 
 #endif

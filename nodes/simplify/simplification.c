@@ -73,7 +73,10 @@ static qmat_status judge_topology(const qmat_simplification *s, const qmat_media
 /* Measures the boundary of `unit` again, after a change. The points of `first` stay those of its owner. */
 static qmat_status measure_boundary_again(const qmat_simplification *s, const qmat_medial_errors *first,
                                           const qmat_medial *unit, bool only_places, qmat_medial_errors *left) {
-  if (left->uncovered != first->uncovered) qmat_medial_errors_uninit(left);
+  if (left->uncovered != first->uncovered) {
+    qmat_free(left->uncovered);
+    qmat_free(left->undecided);
+  }
   left->uncovered = left->undecided = NULL;
   left->uncovered_count = left->undecided_count = 0;
   return qmat_medial_boundary_measure(s->context, s->surface, unit, s->params.epsilon, only_places, left);

@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 
 static const double MOST_SECONDS = 0.5;
@@ -72,11 +73,23 @@ static void test_voxel_cores(void **state) {
   qmat_value_release(&mesh->base);
 }
 
+/* One hull around some ten thousand vertices, all of them extreme. */
+static void test_colliders_of_a_dense_convex_model(void **state) {
+  (void)state;
+  static const double ball[4] = {0, 0, 0, 1};
+  qmat_mesh *mesh = shape_seal(shape_sphere(1, 71));
+  qmat_medial *medial = sealed_medial_mesh(ball, 1, NULL, 0, NULL, 0);
+  must_ask_often("medial.colliders", "kind=hulls", (const qmat_value *[]){&mesh->base, &medial->base});
+  qmat_value_release(&mesh->base);
+  qmat_value_release(&medial->base);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_erosion_thickness),
       cmocka_unit_test(test_poles_and_scale_axis),
       cmocka_unit_test(test_voxel_cores),
+      cmocka_unit_test(test_colliders_of_a_dense_convex_model),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

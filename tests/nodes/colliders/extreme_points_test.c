@@ -12,6 +12,8 @@
 #include "core/hash.h"
 #include "nodes/colliders/convex_hull_cgal.h"
 #include "nodes/colliders/extreme_points.h"
+#include "nodes/colliders/hull_vertices.h"
+#include "nodes/colliders/plane_tree.h"
 
 enum { MOST = 2000 };
 
@@ -112,12 +114,60 @@ static void test_points_without_a_hull_stay(void **state) {
   assert_memory_equal(points, given, 15 * sizeof *points);
 }
 
+/* Planes of a sphere of `count` points; twice each, so that of each two equal ones the first is found. Returns how many
+ * planes are looked at for a point near the sphere. */
+static double planes_visited(size_t count) {
+  enum { QUERIES = 500 };
+  double *points = qmat_alloc(count, 3 * sizeof *points), *planes = qmat_alloc(count, 16 * sizeof *planes);
+  double(*places)[3] = qmat_alloc(count, 4 * sizeof *places);
+  uint32_t *triangles = qmat_alloc(count, 6 * sizeof *triangles);
+  size_t triangle_count, plane_count, visited = 0;
+  assert_true(points && planes && places && triangles);
+  for (size_t i = 0; i < count; i++) qmat_spread_direction(i, count, &points[3 * i]);
+  assert_int_equal(qmat_convex_hull(points, count, triangles, &triangle_count), QMAT_OK);
+  for (plane_count = 0; plane_count < 2 * triangle_count; plane_count++) {
+    const uint32_t *corners = &triangles[3 * (plane_count % triangle_count)];
+    assert_true(qmat_hull_plane(points, corners, &planes[4 * plane_count]));
+    memcpy(places[plane_count], &points[3 * (size_t)corners[0]], sizeof places[0]);
+  }
+  qmat_plane_tree tree = {0};
+  assert_true(qmat_plane_tree_make(&tree, planes, (const double(*)[3])places, plane_count));
+  for (size_t i = 0; i < QUERIES; i++) {
+    double point[3], height = 1e-9, most = 1e-9;
+    qmat_spread_direction(i, QUERIES, point);
+    for (size_t k = 0; k < 3; k++) point[k] *= 0.999 + 0.002 * qmat_hash_unit(qmat_hash3(7, i, 0));
+    size_t best = SIZE_MAX;
+    for (size_t t = 0; t < plane_count; t++) {
+      const double of_plane = qmat_dot(&planes[4 * t], point) - planes[4 * t + 3];
+      if (!(of_plane > most)) continue;
+      most = of_plane;
+      best = t;
+    }
+    assert_int_equal(qmat_plane_tree_farthest(&tree, point, &height, &visited), best);
+    assert_true(height == most);
+  }
+  qmat_plane_tree_uninit(&tree);
+  qmat_free(points);
+  qmat_free(planes);
+  qmat_free(places);
+  qmat_free(triangles);
+  return (double)visited / QUERIES;
+}
+
+/* The same plane as among all, after looks at about as many planes for any number of them. */
+static void test_the_farthest_plane_is_found_among_few(void **state) {
+  (void)state;
+  const double of_few = planes_visited(500), of_many = planes_visited(8000);
+  if (!(of_many < 2 * of_few + 32 && of_many < 400)) fail_msg("%.1f planes, after %.1f", of_many, of_few);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_of_a_grid_in_a_cube_the_corners_stay),
       cmocka_unit_test(test_of_a_ball_the_points_of_its_sphere_stay),
       cmocka_unit_test(test_all_points_are_within_the_tolerance),
       cmocka_unit_test(test_points_without_a_hull_stay),
+      cmocka_unit_test(test_the_farthest_plane_is_found_among_few),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

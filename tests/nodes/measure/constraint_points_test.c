@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "core/geometry/medial_distance.h"
+#include "nodes/measure/interior_points.h"
 #include "tests/medial_distances.h"
 #include "tests/nodes/pipeline.h"
 
@@ -186,6 +187,31 @@ static void test_other_points_stay(void **state) {
   free_model(&m);
 }
 
+/* A small error would ask for a shell of millions of points. */
+static void test_a_shell_has_at_most_some_times_the_points_allowed(void **state) {
+  (void)state;
+  model m;
+  make_model(&m, shape_box(1, 2, 3), "spacing=5% n_f=0");
+  const double epsilon = 0.01;
+  size_t last = 0;
+  for (size_t most = 100; most <= 1000; most *= 10) {
+    qmat_surface *surface;
+    qmat_constraint_points c;
+    qmat_interior_points inner;
+    assert_int_equal(qmat_surface_new(&m.context, m.p.mesh, &surface), QMAT_OK);
+    assert_int_equal(
+        qmat_constraint_points_make(&m.context, surface, m.p.samples, m.p.medial, &m.complex, epsilon, most, true, &c),
+        QMAT_OK);
+    assert_int_equal(qmat_interior_points_find(&m.context, &m.complex, epsilon, &inner), QMAT_OK);
+    const size_t shell = c.count - c.surface_count - inner.count;
+    if (!(shell > last && shell <= 4 * most + m.p.mesh->triangle_count))
+      fail_msg("%zu points in the shell, of at most %zu", shell, 4 * most);
+    last = shell;
+    qmat_surface_free(surface);
+  }
+  free_model(&m);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_far_places_have_their_distance_and_others_an_upper_bound),
@@ -193,6 +219,7 @@ int main(void) {
       cmocka_unit_test(test_places_inside_large_facets_are_farther_apart_than_on_sides),
       cmocka_unit_test(test_points_on_narrow_facets_are_thinned_out),
       cmocka_unit_test(test_other_points_stay),
+      cmocka_unit_test(test_a_shell_has_at_most_some_times_the_points_allowed),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

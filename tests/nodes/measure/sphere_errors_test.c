@@ -8,6 +8,7 @@
 
 #include "core/hash.h"
 #include "nodes/measure/hausdorff_bound.h"
+#include "nodes/measure/medial_errors.h"
 #include "nodes/measure/sphere_errors.h"
 #include "tests/nodes/pipeline.h"
 #include "tests/shapes.h"
@@ -103,12 +104,26 @@ static void test_the_largest_is_that_of_the_whole_surface_for_any_threads(void *
   }
 }
 
+/* One that is not measured is 0, also where the struct held others before. */
+static void test_errors_that_are_freed_are_not_measured(void **state) {
+  (void)state;
+  qmat_medial_errors errors = {.surface_to_envelope = 1,
+                               .envelope_to_surface = 2,
+                               .boundary_to_surface = 3,
+                               .uncovered_count = 1,
+                               .uncovered = qmat_calloc(3, sizeof(double))};
+  qmat_medial_errors_uninit(&errors);
+  assert_true(errors.surface_to_envelope == 0 && errors.envelope_to_surface == 0 && errors.boundary_to_surface == 0);
+  assert_true(errors.uncovered_count == 0 && !errors.uncovered);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_each_of_two_balls_has_the_distance_to_its_own_corners),
       cmocka_unit_test(test_what_answers_for_nothing_or_covers_all_has_no_error),
       cmocka_unit_test(test_the_ends_of_a_cone_share_the_surface_at_its_middle),
       cmocka_unit_test(test_the_largest_is_that_of_the_whole_surface_for_any_threads),
+      cmocka_unit_test(test_errors_that_are_freed_are_not_measured),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
