@@ -42,6 +42,8 @@ static const double weld_tolerance = 1e-5;
 static const double seam_width = 0.2;
 /* Caps of more than this share of a component's given area, and of that of all components, are worth a warning. */
 static const double most_capped = 0.1, most_capped_of_all = 0.05;
+/* Above this share, such as the lid of a flat box, the component may be a container, whose inside is to stay open. */
+static const double maybe_container = 0.15;
 /* A triangle that the union leaves out is within it if it sticks out by at most this, in diagonals: rounding. */
 static const double least_gap = 1e-9;
 /* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
@@ -77,6 +79,8 @@ typedef struct solidifier {
   size_t given_count;    /* of the solids' triangles; behind these are seams and caps */
   uint32_t *solid_parts; /* their parts */
   qmat_hidden_parts hidden;
+  size_t first_pair, last_pair; /* of the sheets' triangles: those of no part */
+  size_t paired_sheets;         /* that these make */
   size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
   double cap_length, cap_area;
   qmat_united united;
@@ -274,8 +278,10 @@ static qmat_status sort_triangles(solidifier *s) {
   if (status == QMAT_OK && s->solids.count > given) status = split_folds(s, given);
   if (status == QMAT_OK && s->caps > 0) status = unfold_caps(s);
   for (size_t i = 0; i < parts->part_count; i++) s->cap_area += parts->parts[i].seam_area;
+  s->first_pair = s->sheets.count;
   for (size_t t = 0; status == QMAT_OK && t < s->pair_count; t++)
     status = append(s, &s->sheets, s->pairs[3 * t], s->pairs[3 * t + 1], s->pairs[3 * t + 2]);
+  s->last_pair = s->sheets.count;
   return status;
 }
 
@@ -384,10 +390,14 @@ static qmat_status drop_inner_sheets(solidifier *s, const qmat_surface *solids) 
   uint8_t *covered = qmat_arena_calloc(&s->context->arena, count, 1);
   if (!covered) return fail_shortage(s);
   const qmat_status status = find_covered(s, solids, s->sheets.corners, count, 0, covered);
+  const size_t first = s->first_pair, last = s->last_pair;
   s->sheets.count = 0;
-  for (size_t t = 0; t < count; t++)
+  for (size_t t = 0; t < count; t++) {
+    if (covered[t] && t < first) s->first_pair--;
+    if (covered[t] && t < last) s->last_pair--;
     if (!covered[t])
       memmove(s->sheets.corners + 3 * s->sheets.count++, s->sheets.corners + 3 * t, 3 * sizeof(uint32_t));
+  }
   s->inner_triangles = count - s->sheets.count;
   return status;
 }
@@ -407,6 +417,12 @@ static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *
     s->unbounding_triangles++;
   }
   return status;
+}
+
+/* The sheets that are of no part: triangles with an opposite one, and given sheets. */
+static qmat_status count_paired_sheets(solidifier *s) {
+  return qmat_count_connected(s->context, s->mesh->vertex_count, s->last_pair - s->first_pair,
+                              s->sheets.corners ? s->sheets.corners + 3 * s->first_pair : NULL, &s->paired_sheets);
 }
 
 /* Moves the flaps behind the other sheets: the components whose triangles are all near solids. */
@@ -434,7 +450,7 @@ static qmat_status set_flaps_apart(solidifier *s, const qmat_surface *solids) {
 }
 
 static qmat_status review_sheets(solidifier *s) {
-  if (s->solids.count == 0 || (s->sheets.count == 0 && !s->united.changed)) return QMAT_OK;
+  if (s->solids.count == 0 || (s->sheets.count == 0 && !s->united.changed)) return count_paired_sheets(s);
   qmat_mesh *mesh = qmat_mesh_new();
   qmat_surface *solids = NULL;
   qmat_status status = mesh ? place_triangles(s, mesh) : fail_shortage(s);
@@ -445,6 +461,7 @@ static qmat_status review_sheets(solidifier *s) {
     qmat_frame_to_unit(qmat_surface_frame(solids), s->mesh->positions, s->mesh->vertex_count, s->beside_solids);
   if (status == QMAT_OK) status = drop_inner_sheets(s, solids);
   if (status == QMAT_OK && s->united.changed) status = keep_unbounding_triangles(s, solids);
+  if (status == QMAT_OK) status = count_paired_sheets(s);
   if (status == QMAT_OK) status = set_flaps_apart(s, solids);
   qmat_surface_free(solids);
   qmat_value_release(mesh ? &mesh->base : NULL);
@@ -473,7 +490,7 @@ static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
 
 /* Warns where caps are a large share of components, and of the model: they may be containers. */
 static int warn_of_large_caps(const solidifier *s, json_t *root) {
-  size_t components = 0;
+  size_t components = 0, worst = 0;
   double largest = 0, capped = 0, all = 0;
   for (size_t i = 0; i < s->parts.part_count && s->params->solid == SOLID_AUTO; i++) {
     const qmat_part *part = &s->parts.parts[i];
@@ -482,14 +499,19 @@ static int warn_of_large_caps(const solidifier *s, json_t *root) {
     if (!(part->cap_area > most_capped * given)) continue;
     components++;
     capped += part->cap_area;
-    largest = fmax(largest, part->cap_area / given);
+    if (part->cap_area / given > largest) largest = part->cap_area / given, worst = i;
   }
   if (!(capped > most_capped_of_all * all)) return 0;
+  const double *at =
+      s->mesh->positions + 3 * (size_t)s->parts.loop_vertices[s->parts.loops[s->parts.parts[worst].first_loop].first];
   return qmat_json_add_warning(
       root,
-      "the openings of %zu component%s are closed by caps of up to %.0f %% of a component's area; "
-      "--set solid.solid=sheet keeps all surfaces open",
-      components, components == 1 ? "" : "s", 100 * largest);
+      "the openings of %zu component%s are closed by caps of up to %.0f %% of a component's area (component %zu, at "
+      "(%.5g, %.5g, %.5g))%s",
+      components, components == 1 ? "" : "s", 100 * largest, worst + 1, at[0], at[1], at[2],
+      largest > maybe_container ? "; "
+                                  "--set solid.solid=sheet keeps all surfaces open"
+                                : "");
 }
 
 static int warn_of_flat_folds(const solidifier *s, json_t *root) {
@@ -513,7 +535,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"parts_open", open},
                                     {"solids", kinds[QMAT_PART_CLOSED] + kinds[QMAT_PART_HOLES]},
                                     {"solids_with_holes", kinds[QMAT_PART_HOLES]},
-                                    {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT]},
+                                    {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT] + s->paired_sheets},
                                     {"sheet_triangles", s->sheets.count},
                                     {"opposite_triangles_merged", s->merged},
                                     {"two_sided_solids", s->sides.solids},

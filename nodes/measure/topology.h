@@ -11,6 +11,7 @@ typedef struct qmat_topology {
   bool known; /* else only the members that the function names are valid */
   size_t components, loops, voids;
   int64_t euler;
+  const char *why_not; /* of a solid that is not known: why, a constant; else NULL */
 } qmat_topology;
 
 /* The medial meshes below need not be sealed. Their edges and triangles are those of qmat_medial_set_simplices: ids
@@ -43,7 +44,8 @@ qmat_status qmat_topology_find_loop_edges(qmat_context *context, const qmat_medi
  * shells its voids, and the genus of either counts its loops. Shells that do not separate inside from outside
  * (contained in another, or without volume) are left out; shells that cross count separately. Not known for an open
  * surface, or with an edge of more than two triangles. Sheets count as simplicial complexes of their own, whatever they
- * touch. Linear but for a sort of each vertex's edges. QMAT_ERROR_MEMORY. */
+ * touch; where all sheets are closed, those without volume count as the thin solids that they bound, which have no
+ * void. Linear but for a sort of each vertex's edges. QMAT_ERROR_MEMORY. */
 qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *surface, qmat_topology *topology);
 
 #endif

@@ -1640,6 +1640,58 @@ static void test_each_choice_does_what_it_says(void **state) {
   release(&r);
 }
 
+/* ---- the report ---- */
+
+/* Two sides of a square cancel: they are no part, and yet a sheet. Of two cubes that touch, a wall is none. */
+static void test_a_card_whose_sides_coincide_counts_as_a_sheet(void **state) {
+  (void)state;
+  qmat_mesh *card = shape_new();
+  const double corners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  for (uint32_t i = 0; i < 4; i++) shape_vertex(card, corners[i][0], corners[i][1], 0);
+  shape_triangle(card, 0, 1, 2);
+  shape_triangle(card, 0, 2, 3);
+  shape_triangle(card, 2, 1, 0);
+  shape_triangle(card, 3, 2, 0);
+  result r = unite(card);
+  assert_int_equal(pipeline_count(r.report, "parts"), 0);
+  assert_int_equal(pipeline_count(r.report, "sheets"), 1);
+  release(&r);
+  qmat_mesh *cubes = shape_box(1, 1, 1);
+  shape_add_box(cubes, 1, 0, 0, 2, 1, 1, false);
+  weld(cubes);
+  r = unite(cubes);
+  assert_int_equal(pipeline_count(r.report, "sheets"), 0);
+  release(&r);
+}
+
+/* A channel of a square section: its two ends are a seventh of what is given; a box without a lid has a fifth. */
+static void test_a_warning_of_caps_names_the_place_and_a_way_out_where_caps_are_large(void **state) {
+  (void)state;
+  for (int large = 0; large < 2; large++) {
+    qmat_mesh *mesh = large ? shape_box(1, 1, 0.8) : shape_box(1, 1, 3.6);
+    for (size_t t = 0; t < mesh->triangle_count; t++) { /* without what faces up, and down */
+      bool up = true, down = true;
+      for (int k = 0; k < 3; k++) {
+        const double z = mesh->positions[3 * (size_t)mesh->triangles[3 * t + (size_t)k] + 2];
+        up = up && z > 0.5;
+        down = down && z == 0;
+      }
+      if (up || (down && !large)) {
+        mesh->triangle_count--;
+        memmove(mesh->triangles + 3 * t, mesh->triangles + 3 * (t + 1),
+                3 * (mesh->triangle_count - t) * sizeof *mesh->triangles);
+        t--;
+      }
+    }
+    result r = unite(mesh);
+    const char *warning = json_string_value(json_array_get(json_object_get(r.report->root, "warnings"), 0));
+    assert_non_null(warning);
+    assert_non_null(strstr(warning, "(component 1, at ("));
+    assert_int_equal(strstr(warning, "solid.solid=sheet") != NULL, large);
+    release(&r);
+  }
+}
+
 /* ---- flat faces that are folded ---- */
 
 /* A prism over a polygon, turned about the x axis, in single precision. Its ends are the fans of their first corners.
@@ -1843,6 +1895,8 @@ int main(void) {
       cmocka_unit_test(test_a_cap_that_folds_onto_a_badly_cut_ear_is_triangulated_again),
       cmocka_unit_test(test_a_face_that_no_triangles_can_fill_has_a_warning_with_its_place),
       cmocka_unit_test(test_a_leaf_of_two_sides_on_a_box_stays),
+      cmocka_unit_test(test_a_card_whose_sides_coincide_counts_as_a_sheet),
+      cmocka_unit_test(test_a_warning_of_caps_names_the_place_and_a_way_out_where_caps_are_large),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
