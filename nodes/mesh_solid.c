@@ -515,7 +515,6 @@ static int warn_of_large_caps(const solidifier *s, json_t *root) {
 }
 
 static int warn_of_flat_folds(const solidifier *s, json_t *root) {
-  if (s->flat.failed == 0) return 0;
   const double *at = s->mesh->positions + 3 * (size_t)s->flat.place;
   return qmat_json_add_warning(root,
                                "%zu flat face%s with triangles that overlap, the first at (%.5g, %.5g, %.5g), cannot "
@@ -564,7 +563,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
     bad |= qmat_parts_report(&s->parts, s->facing, s->cap_areas, root);
   bad |= warn_of_hidden_solids(s, root);
   bad |= warn_of_large_caps(s, root);
-  bad |= warn_of_flat_folds(s, root);
+  if (s->flat.failed > 0) bad |= warn_of_flat_folds(s, root);
   if (s->united.why_not)
     bad |= qmat_json_add_warning(root, "the solids are wrapped: those that intersect cannot be united: %s",
                                  s->united.why_not);
