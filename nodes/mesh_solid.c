@@ -168,7 +168,7 @@ static qmat_status weld_seams(solidifier *s) {
 
 static qmat_status unfold_flat_faces(solidifier *s) {
   const qmat_status status = qmat_unfold_flat_faces(s->context, s->mesh->vertex_count, s->unit, s->triangle_count,
-                                                    s->triangles, same_place(s), &s->flat);
+                                                    s->triangles, same_place(s), flap_reach * epsilon_of(s), &s->flat);
   if (s->flat.triangles) s->triangles = s->flat.triangles, s->triangle_count = s->flat.triangle_count;
   return status;
 }
@@ -239,7 +239,7 @@ static qmat_status split_folds(solidifier *s, size_t given) {
 static qmat_status unfold_caps(solidifier *s) {
   qmat_flat_folds flat;
   qmat_status status = qmat_unfold_flat_faces(s->context, s->mesh->vertex_count, s->unit, s->solids.count,
-                                              s->solids.corners, same_place(s), &flat);
+                                              s->solids.corners, same_place(s), flap_reach * epsilon_of(s), &flat);
   if (status != QMAT_OK || flat.faces == 0) return status;
   size_t given = 0;
   for (size_t t = 0; t < s->given_count; t++)

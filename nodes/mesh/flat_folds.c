@@ -31,7 +31,7 @@ typedef struct side {
 typedef struct unfolder {
   qmat_context *context;
   const double *positions;
-  double tolerance;
+  double tolerance, longest_fold;
   qmat_half_edges e;
   uint32_t *mates; /* per half-edge: the other one of an edge of two triangles, or UINT32_MAX */
   fold *folds;
@@ -73,7 +73,7 @@ static bool is_fold(const unfolder *u, uint32_t h, uint32_t mate, fold *found) {
   const double *p = position(u, apex), *n = swaps ? other : one, largest = fmax(a, b);
   const double from[3] = {p[0] - start[0], p[1] - start[1], p[2] - start[2]};
   *found = (fold){largest, fmin(a, b) / length, (swaps ? mate : h) / 3, (swaps ? h : mate) / 3};
-  return found->height > u->tolerance &&
+  return found->height > u->longest_fold &&
          fabs(qmat_dot(n, from)) <= largest * fmin(u->tolerance, flatness * found->height);
 }
 
@@ -251,9 +251,13 @@ static qmat_status join_triangles(unfolder *u, size_t given) {
 
 qmat_status qmat_unfold_flat_faces(qmat_context *context, size_t vertex_count, const double *positions,
                                    size_t triangle_count, const uint32_t *triangles, double tolerance,
-                                   qmat_flat_folds *folds) {
+                                   double longest_fold, qmat_flat_folds *folds) {
   *folds = (qmat_flat_folds){.faces = 0};
-  unfolder u = {.context = context, .positions = positions, .tolerance = tolerance, .result = folds};
+  unfolder u = {.context = context,
+                .positions = positions,
+                .tolerance = tolerance,
+                .longest_fold = longest_fold,
+                .result = folds};
   qmat_arena *arena = &context->arena;
   qmat_status status = qmat_half_edges_sort(context, vertex_count, triangle_count, triangles, &u.e);
   u.mates = qmat_arena_alloc(arena, 3 * triangle_count, sizeof *u.mates);
