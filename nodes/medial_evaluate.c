@@ -333,7 +333,7 @@ const qmat_node qmat_node_medial_evaluate = {
         "for each sphere, over the part of the surface that it answers for.\n\n"
         "The deviation of a subdivision surface (mesh.subdivide) is part of all bounds. Components, loops and voids "
         "are Betti numbers over Z/2; those of the solid and its sheets (_of_solid) are missing where the surface is "
-        "open or has an edge of more than two triangles.",
+        "open or has an edge of more than two triangles; topology_of_solid_not_known says so.",
     .citation = "Section 3.1.1 and eq. 9",
     .params_size = sizeof(medial_evaluate_params),
     .params = params,

@@ -12,11 +12,13 @@
 #include "nodes/descriptor/epsilon.h"
 #include "nodes/descriptor/libraries.h"
 #include "nodes/mesh/border_weld.h"
+#include "nodes/mesh/flat_folds.h"
 #include "nodes/mesh/hidden_parts.h"
 #include "nodes/mesh/hole_cgal.h"
 #include "nodes/mesh/lend_joints.h"
 #include "nodes/mesh/opposite_pairs.h"
 #include "nodes/mesh/overlaps.h"
+#include "nodes/mesh/parts_report.h"
 #include "nodes/mesh/seams.h"
 #include "nodes/mesh/triangle_cover.h"
 #include "nodes/mesh/turned_parts.h"
@@ -40,6 +42,8 @@ static const double weld_tolerance = 1e-5;
 static const double seam_width = 0.2;
 /* Caps of more than this share of a component's given area, and of that of all components, are worth a warning. */
 static const double most_capped = 0.1, most_capped_of_all = 0.05;
+/* Above this share, such as the lid of a flat box, the component may be a container, whose inside is to stay open. */
+static const double maybe_container = 0.15;
 /* A triangle that the union leaves out is within it if it sticks out by at most this, in diagonals: rounding. */
 static const double least_gap = 1e-9;
 /* A component of sheets is a flap if it sticks out of solids by at most this share of epsilon: an envelope near the
@@ -47,7 +51,6 @@ static const double least_gap = 1e-9;
 static const double flap_reach = 0.75;
 /* If the union leaves less than this share of the other solids, one may hide them by mistake. */
 static const double least_left = 0.2;
-enum { MOST_LISTED = 64, MOST_CAPS_LISTED = 16 }; /* components and caps that the report lists */
 
 typedef struct triangle_list {
   size_t count, capacity;
@@ -63,6 +66,7 @@ typedef struct solidifier {
   size_t triangle_count;     /* those that are left after welding; without the given sheets' */
   const uint32_t *triangles; /* 3 * triangle_count */
   qmat_border_weld weld;
+  qmat_flat_folds flat;
   qmat_two_sides sides;
   size_t merged;                  /* triangles that are left out for an opposite one */
   size_t plain_count, pair_count; /* triangles without an opposite one; the first of each pair, and given sheets */
@@ -75,6 +79,8 @@ typedef struct solidifier {
   size_t given_count;    /* of the solids' triangles; behind these are seams and caps */
   uint32_t *solid_parts; /* their parts */
   qmat_hidden_parts hidden;
+  size_t first_pair, last_pair; /* of the sheets' triangles: those of no part */
+  size_t paired_sheets;         /* that these make */
   size_t caps, cap_sides, folded, turned_parts, inner_triangles, unbounding_triangles, flaps;
   double cap_length, cap_area;
   qmat_united united;
@@ -160,6 +166,13 @@ static qmat_status weld_seams(solidifier *s) {
   return QMAT_OK;
 }
 
+static qmat_status unfold_flat_faces(solidifier *s) {
+  const qmat_status status = qmat_unfold_flat_faces(s->context, s->mesh->vertex_count, s->unit, s->triangle_count,
+                                                    s->triangles, same_place(s), flap_reach * epsilon_of(s), &s->flat);
+  if (s->flat.triangles) s->triangles = s->flat.triangles, s->triangle_count = s->flat.triangle_count;
+  return status;
+}
+
 /* ---- solids ---- */
 
 static qmat_status turn_parts(solidifier *s) {
@@ -222,6 +235,24 @@ static qmat_status split_folds(solidifier *s, size_t given) {
   return status;
 }
 
+/* A cap may fold flat onto given triangles that lie outside of its face, as badly cut ears of a polygon do. */
+static qmat_status unfold_caps(solidifier *s) {
+  qmat_flat_folds flat;
+  qmat_status status = qmat_unfold_flat_faces(s->context, s->mesh->vertex_count, s->unit, s->solids.count,
+                                              s->solids.corners, same_place(s), flap_reach * epsilon_of(s), &flat);
+  if (status != QMAT_OK || flat.faces == 0) return status;
+  size_t given = 0;
+  for (size_t t = 0; t < s->given_count; t++)
+    if (flat.stays[t]) s->solid_parts[given++] = s->solid_parts[t];
+  s->given_count = given;
+  s->solids.count = 0;
+  for (size_t i = 0; status == QMAT_OK && i < 3 * flat.triangle_count; i += 3)
+    status = append(s, &s->solids, flat.triangles[i], flat.triangles[i + 1], flat.triangles[i + 2]);
+  s->flat.faces += flat.faces;
+  s->flat.distance = fmax(s->flat.distance, flat.distance);
+  return status;
+}
+
 /* The triangles of solid parts, then those in seams and caps; those of sheets, then one of each pair. */
 static qmat_status sort_triangles(solidifier *s) {
   const qmat_parts *parts = &s->parts;
@@ -245,9 +276,12 @@ static qmat_status sort_triangles(solidifier *s) {
     if (status == QMAT_OK) status = qmat_progress(s->context, i, parts->loop_count, "borders");
   }
   if (status == QMAT_OK && s->solids.count > given) status = split_folds(s, given);
+  if (status == QMAT_OK && s->caps > 0) status = unfold_caps(s);
   for (size_t i = 0; i < parts->part_count; i++) s->cap_area += parts->parts[i].seam_area;
+  s->first_pair = s->sheets.count;
   for (size_t t = 0; status == QMAT_OK && t < s->pair_count; t++)
     status = append(s, &s->sheets, s->pairs[3 * t], s->pairs[3 * t + 1], s->pairs[3 * t + 2]);
+  s->last_pair = s->sheets.count;
   return status;
 }
 
@@ -275,8 +309,9 @@ static qmat_status wrap_triangles(solidifier *s, const uint32_t *triangles, size
 /* ---- the mesh ---- */
 
 static bool is_unchanged(const solidifier *s) {
-  return s->solids.count == s->mesh->triangle_count && s->weld.merged == 0 && s->caps == 0 && s->turned_parts == 0 &&
-         s->parts.turned == 0 && !s->united.changed && !s->wrap.triangles && s->mesh->closed && s->mesh->oriented;
+  return s->solids.count == s->mesh->triangle_count && s->weld.merged == 0 && s->flat.faces == 0 && s->caps == 0 &&
+         s->turned_parts == 0 && s->parts.turned == 0 && !s->united.changed && !s->wrap.triangles && s->mesh->closed &&
+         s->mesh->oriented;
 }
 
 /* Numbers the used vertices in their order. The sheets' vertices are the given mesh's; the solids' are too unless they
@@ -304,8 +339,10 @@ static qmat_status fill_mesh(const solidifier *s, const double *positions, size_
   for (size_t i = 0; i < 3 * s->sheets.count; i++)
     mesh->triangles[3 * triangle_count + i] = numbers[shift + s->sheets.corners[i]];
   mesh->closed = mesh->oriented = true;
-  mesh->deviation = s->mesh->deviation +
-                    (s->weld.moved + s->sides.distance + s->parts.split_distance) * s->frame.diagonal + s->united.moved;
+  mesh->deviation =
+      s->mesh->deviation +
+      (s->weld.moved + s->flat.distance + s->sides.distance + s->parts.split_distance) * s->frame.diagonal +
+      s->united.moved;
   mesh->meters_per_unit = s->mesh->meters_per_unit;
   mesh->flap_triangle_count = s->flaps;
   if (s->sheets.count > 0) mesh->sheet_thickness = sheet_thickness(s);
@@ -340,24 +377,10 @@ static qmat_status make_mesh(const solidifier *s, qmat_mesh **made) {
  * `reach` diagonals. Those that are 1 already are passed over. */
 static qmat_status find_covered(const solidifier *s, const qmat_surface *solids, const uint32_t *triangles,
                                 size_t count, double reach, uint8_t *covered) {
-  enum { SLICE = 512 };
-  const int threads = qmat_threads(s->context);
   /* The frame of the solids may be smaller than the given mesh's. */
   const double scale = s->frame.diagonal / qmat_surface_frame(solids)->diagonal;
-  for (size_t first = 0; first < count; first += SLICE) {
-    const size_t last = count - first < SLICE ? count : first + SLICE;
-    const qmat_status status = qmat_progress(s->context, first, count, "triangles");
-    if (status != QMAT_OK) return status;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
-    for (size_t t = first; t < last; t++) {
-      const double *corners[3];
-      for (size_t k = 0; k < 3; k++) corners[k] = s->beside_solids + 3 * (size_t)triangles[3 * t + k];
-      if (!covered[t])
-        covered[t] =
-            qmat_triangle_is_covered(solids, (const double *const *)corners, scale * reach, scale * epsilon_of(s));
-    }
-  }
-  return QMAT_OK;
+  return qmat_triangles_find_covered(s->context, solids, s->beside_solids, triangles, count, scale * reach,
+                                     scale * epsilon_of(s), covered);
 }
 
 /* Leaves out the sheets' triangles that lie inside a solid, such as walls between solids that touch: they bound
@@ -367,10 +390,14 @@ static qmat_status drop_inner_sheets(solidifier *s, const qmat_surface *solids) 
   uint8_t *covered = qmat_arena_calloc(&s->context->arena, count, 1);
   if (!covered) return fail_shortage(s);
   const qmat_status status = find_covered(s, solids, s->sheets.corners, count, 0, covered);
+  const size_t first = s->first_pair, last = s->last_pair;
   s->sheets.count = 0;
-  for (size_t t = 0; t < count; t++)
+  for (size_t t = 0; t < count; t++) {
+    if (covered[t] && t < first) s->first_pair--;
+    if (covered[t] && t < last) s->last_pair--;
     if (!covered[t])
       memmove(s->sheets.corners + 3 * s->sheets.count++, s->sheets.corners + 3 * t, 3 * sizeof(uint32_t));
+  }
   s->inner_triangles = count - s->sheets.count;
   return status;
 }
@@ -390,6 +417,12 @@ static qmat_status keep_unbounding_triangles(solidifier *s, const qmat_surface *
     s->unbounding_triangles++;
   }
   return status;
+}
+
+/* The sheets that are of no part: triangles with an opposite one, and given sheets. */
+static qmat_status count_paired_sheets(solidifier *s) {
+  return qmat_count_connected(s->context, s->mesh->vertex_count, s->last_pair - s->first_pair,
+                              s->sheets.corners ? s->sheets.corners + 3 * s->first_pair : NULL, &s->paired_sheets);
 }
 
 /* Moves the flaps behind the other sheets: the components whose triangles are all near solids. */
@@ -417,7 +450,7 @@ static qmat_status set_flaps_apart(solidifier *s, const qmat_surface *solids) {
 }
 
 static qmat_status review_sheets(solidifier *s) {
-  if (s->solids.count == 0 || (s->sheets.count == 0 && !s->united.changed)) return QMAT_OK;
+  if (s->solids.count == 0 || (s->sheets.count == 0 && !s->united.changed)) return count_paired_sheets(s);
   qmat_mesh *mesh = qmat_mesh_new();
   qmat_surface *solids = NULL;
   qmat_status status = mesh ? place_triangles(s, mesh) : fail_shortage(s);
@@ -428,6 +461,7 @@ static qmat_status review_sheets(solidifier *s) {
     qmat_frame_to_unit(qmat_surface_frame(solids), s->mesh->positions, s->mesh->vertex_count, s->beside_solids);
   if (status == QMAT_OK) status = drop_inner_sheets(s, solids);
   if (status == QMAT_OK && s->united.changed) status = keep_unbounding_triangles(s, solids);
+  if (status == QMAT_OK) status = count_paired_sheets(s);
   if (status == QMAT_OK) status = set_flaps_apart(s, solids);
   qmat_surface_free(solids);
   qmat_value_release(mesh ? &mesh->base : NULL);
@@ -435,48 +469,6 @@ static qmat_status review_sheets(solidifier *s) {
 }
 
 /* ---- the report ---- */
-
-static const char *const kind_names[QMAT_PART_KIND_COUNT] = {[QMAT_PART_CLOSED] = "solid",
-                                                             [QMAT_PART_HOLES] = "solid with holes",
-                                                             [QMAT_PART_OPEN] = "sheet",
-                                                             [QMAT_PART_FLAT] = "sheet of two sides"};
-
-static json_t *describe_part(const solidifier *s, uint32_t number) {
-  const qmat_part *part = &s->parts.parts[number];
-  json_t *caps = json_array(),
-         *object = json_pack("{s:I,s:s,s:f}", "triangles", (json_int_t)(part->triangle_count - part->seam_triangles),
-                             "taken_for", kind_names[part->kind], "area", part->area - part->seam_area);
-  int bad = !caps || !object;
-  if (!bad && s->facing[number] == QMAT_FACING_TURNED) bad |= json_object_set_new(object, "turned", json_true());
-  if (!bad && s->facing[number] == QMAT_FACING_CAVITY) bad |= json_object_set_new(object, "cavity", json_true());
-  if (!bad && part->seam_triangles > 0) {
-    bad |= qmat_json_set_count(object, "seam_triangles", part->seam_triangles);
-    bad |= json_object_set_new(object, "seam_area", json_real(part->seam_area));
-  }
-  if (!bad && part->kind == QMAT_PART_HOLES) {
-    bad |= qmat_json_set_count(object, "caps", part->loop_count);
-    for (size_t i = 0; i < part->loop_count && i < MOST_CAPS_LISTED; i++) {
-      const qmat_loop *loop = &s->parts.loops[part->first_loop + i];
-      bad |= json_array_append_new(caps, json_pack("{s:I,s:f,s:f}", "sides", (json_int_t)loop->count, "length",
-                                                   loop->length, "area", s->cap_areas[part->first_loop + i]));
-    }
-    bad |= json_object_set(object, "largest_caps", caps);
-  }
-  json_decref(caps);
-  if (!bad) return object;
-  json_decref(object);
-  return NULL;
-}
-
-static int report_parts(const solidifier *s, json_t *root) {
-  json_t *list = json_array();
-  int bad = !list;
-  for (uint32_t i = 0; i < s->parts.part_count && i < MOST_LISTED; i++)
-    bad |= json_array_append_new(list, describe_part(s, i));
-  if (s->parts.part_count > MOST_LISTED)
-    bad |= qmat_json_set_count(root, "components_not_listed", s->parts.part_count - MOST_LISTED);
-  return bad | json_object_set_new(root, "components", list);
-}
 
 /* Warns where the union leaves few solids, or none within a room that is seen from inside. */
 static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
@@ -498,7 +490,7 @@ static int warn_of_hidden_solids(const solidifier *s, json_t *root) {
 
 /* Warns where caps are a large share of components, and of the model: they may be containers. */
 static int warn_of_large_caps(const solidifier *s, json_t *root) {
-  size_t components = 0;
+  size_t components = 0, worst = 0;
   double largest = 0, capped = 0, all = 0;
   for (size_t i = 0; i < s->parts.part_count && s->params->solid == SOLID_AUTO; i++) {
     const qmat_part *part = &s->parts.parts[i];
@@ -507,14 +499,27 @@ static int warn_of_large_caps(const solidifier *s, json_t *root) {
     if (!(part->cap_area > most_capped * given)) continue;
     components++;
     capped += part->cap_area;
-    largest = fmax(largest, part->cap_area / given);
+    if (part->cap_area / given > largest) largest = part->cap_area / given, worst = i;
   }
   if (!(capped > most_capped_of_all * all)) return 0;
+  const double *at =
+      s->mesh->positions + 3 * (size_t)s->parts.loop_vertices[s->parts.loops[s->parts.parts[worst].first_loop].first];
   return qmat_json_add_warning(
       root,
-      "the openings of %zu component%s are closed by caps of up to %.0f %% of a component's area; "
-      "--set solid.solid=sheet keeps all surfaces open",
-      components, components == 1 ? "" : "s", 100 * largest);
+      "the openings of %zu component%s are closed by caps of up to %.0f %% of a component's area (component %zu, at "
+      "(%.5g, %.5g, %.5g))%s",
+      components, components == 1 ? "" : "s", 100 * largest, worst + 1, at[0], at[1], at[2],
+      largest > maybe_container ? "; "
+                                  "--set solid.solid=sheet keeps all surfaces open"
+                                : "");
+}
+
+static int warn_of_flat_folds(const solidifier *s, json_t *root) {
+  const double *at = s->mesh->positions + 3 * (size_t)s->flat.place;
+  return qmat_json_add_warning(root,
+                               "%zu flat face%s with triangles that overlap, the first at (%.5g, %.5g, %.5g), cannot "
+                               "be triangulated again; solid=wrap makes one closed surface around everything",
+                               s->flat.failed, s->flat.failed == 1 ? "" : "s", at[0], at[1], at[2]);
 }
 
 static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_report *report) {
@@ -529,7 +534,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"parts_open", open},
                                     {"solids", kinds[QMAT_PART_CLOSED] + kinds[QMAT_PART_HOLES]},
                                     {"solids_with_holes", kinds[QMAT_PART_HOLES]},
-                                    {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT]},
+                                    {"sheets", kinds[QMAT_PART_OPEN] + kinds[QMAT_PART_FLAT] + s->paired_sheets},
                                     {"sheet_triangles", s->sheets.count},
                                     {"opposite_triangles_merged", s->merged},
                                     {"two_sided_solids", s->sides.solids},
@@ -543,6 +548,7 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
                                     {"caps", s->caps},
                                     {"cap_sides", s->cap_sides},
                                     {"triangles_folded", s->folded},
+                                    {"faces_triangulated_again", s->flat.faces},
                                     {"parts_united", s->united.shells_united},
                                     {"triangles_cut", s->united.cut_triangles}};
   int bad = qmat_json_set_counts(root, counts, sizeof counts / sizeof *counts);
@@ -553,9 +559,11 @@ static qmat_status fill_report(const solidifier *s, const qmat_mesh *made, qmat_
     bad |= qmat_json_set_count(root, "vertices", made->vertex_count);
     bad |= qmat_json_set_count(root, "triangles", made->triangle_count);
   }
-  if (s->params->solid != SOLID_AS_IS && s->params->solid != SOLID_WRAP) bad |= report_parts(s, root);
+  if (s->params->solid != SOLID_AS_IS && s->params->solid != SOLID_WRAP)
+    bad |= qmat_parts_report(&s->parts, s->facing, s->cap_areas, root);
   bad |= warn_of_hidden_solids(s, root);
   bad |= warn_of_large_caps(s, root);
+  if (s->flat.failed > 0) bad |= warn_of_flat_folds(s, root);
   if (s->united.why_not)
     bad |= qmat_json_add_warning(root, "the solids are wrapped: those that intersect cannot be united: %s",
                                  s->united.why_not);
@@ -570,6 +578,7 @@ static qmat_status make_solid(solidifier *s) {
   if (!s->unit) return fail_shortage(s);
   qmat_frame_to_unit(&s->frame, s->mesh->positions, s->mesh->vertex_count, s->unit);
   qmat_status status = weld_seams(s);
+  if (status == QMAT_OK) status = unfold_flat_faces(s);
   if (status == QMAT_OK) status = drop_second_sides(s);
   if (status == QMAT_OK) status = split_pairs(s);
   if (status == QMAT_OK)
@@ -662,7 +671,10 @@ const qmat_node qmat_node_mesh_solid = {
         "border vertices on them, up to 1e-5 diagonals away (T-junctions), and borders that run along each other "
         "within a fifth of epsilon, such as those of mirrored halves, are joined by triangles, where that makes a "
         "solid much thicker than the seam is wide. Of triangles that coincide with opposite sides one is kept. A "
-        "closed surface that is given with both sides is a solid. What faces inwards and is no cavity is turned.\n\n"
+        "closed surface that is given with both sides is a solid. What faces inwards and is no cavity is turned. A "
+        "flat "
+        "face whose triangles overlap, such as a concave polygon that is given as a fan, is triangulated again within "
+        "its border (faces_triangulated_again).\n\n"
         "Solids that overlap or cross themselves are then replaced by the boundary of their union (a winding number "
         "above 0). Their triangles are cut in exact arithmetic; only new vertices are rounded. Blocks whose sides "
         "touch, or are at most 1e-6 diagonals apart, become one. Cavities stay. Sheets inside a solid are left out. "

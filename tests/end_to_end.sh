@@ -140,6 +140,11 @@ judge "parts: two-sided error, one component, Euler characteristic" parts.off pa
   --euler 1
 holds "parts: both were united" grep -q '"parts_united": 2' parts.json
 holds "parts: the stated errors hold" qmat info parts.glb --against parts.off
+qmat info parts.ma --against parts.off >from.txt
+holds "parts: a file without epsilon is certified from some epsilon on" \
+  test "$(grep -c 'certified from an epsilon of 0\.' from.txt)$(grep -c 'certified for' from.txt)" = 10
+qmat info parts.ma --against parts.off --json >from.json
+holds "parts: and in JSON" grep -q '"certified_from": 0\.' from.json
 
 # ---- Bad input ----
 

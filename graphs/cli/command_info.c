@@ -52,6 +52,23 @@ static double number_of(const json_t *object, const char *key) {
   return json_is_number(value) ? json_number_value(value) : (double)NAN;
 }
 
+/* The least epsilon that the bounds certify, rounded up to three digits; NAN for an open surface, which none does. */
+static double certified_from(const json_t *measured) {
+  const double most = fmax(number_of(measured, "surface_to_envelope"), number_of(measured, "envelope_to_surface"));
+  if (json_is_true(json_object_get(measured, "estimate")) || !(most > 0 && most < INFINITY)) return NAN;
+  const double unit = pow(10, floor(log10(most)) - 2);
+  return ceil(most / unit) * unit;
+}
+
+/* Says for which epsilon the model is certified; a file that states none asks for none. */
+static void print_certified(const json_t *facts, const json_t *measured) {
+  const bool certified = json_is_true(json_object_get(measured, "certified"));
+  const double from = certified_from(measured);
+  if (!isnan(number_of(facts, "qmat_epsilon")) || isnan(from))
+    printf("  %s for an epsilon of %.6g\n", certified ? "certified" : "not certified", number_of(measured, "epsilon"));
+  if (!isnan(from)) printf("  certified from an epsilon of %.3g on\n", from);
+}
+
 /* Compares the errors that the file states with measured bounds. A stated error below its lower bound is refuted. */
 static qmat_status compare(const info_call *call, const json_t *facts, const json_t *measured) {
   const struct {
@@ -76,10 +93,7 @@ static qmat_status compare(const info_call *call, const json_t *facts, const jso
                          rows[i].title);
     }
   }
-  if (call->json) return status;
-  printf("  %s for an epsilon of %.6g\n",
-         json_is_true(json_object_get(measured, "certified")) ? "certified" : "not certified",
-         number_of(measured, "epsilon"));
+  if (!call->json) print_certified(facts, measured);
   return status;
 }
 
@@ -101,11 +115,13 @@ static qmat_status run_node(qmat_context *context, const char *name, double epsi
 
 /* Prints what mesh.solid took each component for, and what it did. Lengths are in diagonals. */
 static void print_components(const json_t *report) {
-  static const char *const counts[] = {
-      "components_not_listed", "vertices_welded", "sheet_triangles",      "opposite_triangles_merged",
-      "two_sided_solids",      "inner_triangles", "unbounding_triangles", "flap_triangles",
-      "triangles_turned",      "edges_split",     "seam_triangles",       "parts_united",
-      "triangles_cut"};
+  static const char *const counts[] = {"components_not_listed", "vertices_welded",
+                                       "sheet_triangles",       "opposite_triangles_merged",
+                                       "two_sided_solids",      "inner_triangles",
+                                       "unbounding_triangles",  "flap_triangles",
+                                       "triangles_turned",      "faces_triangulated_again",
+                                       "edges_split",           "seam_triangles",
+                                       "parts_united",          "triangles_cut"};
   size_t i;
   json_t *part;
   json_array_foreach(json_object_get(report, "components"), i, part) {
@@ -162,7 +178,9 @@ static qmat_status check_against(const info_call *call, const char *path, const 
     if (status == QMAT_OK)
       status = run_node(context, "medial.evaluate", epsilon, (const qmat_value *const[]){mesh, &medial->base}, &output);
     if (status == QMAT_OK) {
+      const double from = certified_from(((const qmat_report *)output)->root);
       if (json) json_object_set(json, "against", ((const qmat_report *)output)->root);
+      if (json && !isnan(from)) json_object_set_new(json, "certified_from", json_real(from));
       status = compare(call, facts, ((const qmat_report *)output)->root);
       if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
     }

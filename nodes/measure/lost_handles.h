@@ -4,7 +4,8 @@
 
 #include "core/geometry/surface.h"
 
-/* A handle of a solid, or a hole through it, by the shortest loop around it that was found. */
+/* A handle of a solid, or a hole through it, by the loop around it that was chosen: one whose middle tells that it is
+ * lost comes before a shorter one, so place and size depend on the result, not on the solid alone. */
 typedef struct qmat_lost_handle {
   double place[3]; /* the middle of the loop, unit frame */
   double size;     /* the loop's length divided by pi: the diameter of a circle as long */

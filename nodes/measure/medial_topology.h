@@ -9,6 +9,7 @@ typedef struct qmat_topology {
   bool known; /* else only the members that the function names are valid */
   size_t components, loops, voids;
   int64_t euler;
+  const char *why_not; /* of a solid that is not known: why, a constant; else NULL */
 } qmat_topology;
 
 /* The medial meshes below need not be sealed. Their edges and triangles are those of qmat_medial_set_simplices: ids

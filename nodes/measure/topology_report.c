@@ -28,6 +28,8 @@ qmat_status qmat_topology_report(qmat_context *context, const qmat_medial *media
   int bad = status == QMAT_OK ? set_numbers(root, &topology, true, of_medial) : 0;
   if (status == QMAT_OK) status = qmat_topology_of_solid(context, surface, &topology);
   if (status == QMAT_OK) bad |= set_numbers(root, &topology, false, of_solid);
+  if (status == QMAT_OK && topology.why_not)
+    bad |= json_object_set_new(root, "topology_of_solid_not_known", json_string(topology.why_not));
   if (status != QMAT_OK) return status;
   return bad ? qmat_fail_memory(context, "the report") : QMAT_OK;
 }

@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 
+#include "core/disjoint_sets.h"
 #include "core/geometry/half_edges.h"
 
 /* Half-edges between two polls for a cancel. */
@@ -61,4 +62,20 @@ qmat_status qmat_find_opposite_pairs(qmat_context *context, size_t vertex_count,
   }
   qmat_free(wings);
   return status;
+}
+
+qmat_status qmat_count_connected(qmat_context *context, size_t vertex_count, size_t count, const uint32_t *triangles,
+                                 size_t *sets) {
+  *sets = 0;
+  if (count == 0) return QMAT_OK;
+  uint32_t *leaders = qmat_sets_new(context, vertex_count);
+  uint8_t *is_counted = qmat_arena_calloc(&context->arena, vertex_count, 1);
+  if (!leaders || !is_counted) return qmat_fail_memory(context, "the sheets");
+  for (size_t i = 0; i < 3 * count; i++) qmat_sets_join(leaders, triangles[i], triangles[i - i % 3]);
+  for (size_t i = 0; i < 3 * count; i += 3) {
+    uint8_t *counted = &is_counted[qmat_set_leader(leaders, triangles[i])];
+    *sets += !*counted;
+    *counted = 1;
+  }
+  return QMAT_OK;
 }

@@ -10,4 +10,9 @@
 qmat_status qmat_find_opposite_pairs(qmat_context *context, size_t vertex_count, size_t count,
                                      const uint32_t *triangles, uint8_t *classes);
 
+/* Counts the sets of triangles that are connected at vertices. `triangles`: 3 * count ids below `vertex_count`; NULL if
+ * there are none. QMAT_ERROR_MEMORY. One thread. Cost: nearly linear. */
+qmat_status qmat_count_connected(qmat_context *context, size_t vertex_count, size_t count, const uint32_t *triangles,
+                                 size_t *sets);
+
 #endif

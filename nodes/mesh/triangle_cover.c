@@ -37,3 +37,22 @@ bool qmat_triangle_is_covered(const qmat_surface *solids, const double *const co
   }
   return true;
 }
+
+qmat_status qmat_triangles_find_covered(qmat_context *context, const qmat_surface *solids, const double *positions,
+                                        const uint32_t *triangles, size_t count, double reach, double spacing,
+                                        uint8_t *covered) {
+  enum { SLICE = 512 };
+  const int threads = qmat_threads(context);
+  for (size_t first = 0; first < count; first += SLICE) {
+    const size_t last = count - first < SLICE ? count : first + SLICE;
+    const qmat_status status = qmat_progress(context, first, count, "triangles");
+    if (status != QMAT_OK) return status;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
+    for (size_t t = first; t < last; t++) {
+      const double *corners[3];
+      for (size_t k = 0; k < 3; k++) corners[k] = positions + 3 * (size_t)triangles[3 * t + k];
+      if (!covered[t]) covered[t] = qmat_triangle_is_covered(solids, (const double *const *)corners, reach, spacing);
+    }
+  }
+  return QMAT_OK;
+}

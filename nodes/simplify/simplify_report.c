@@ -92,6 +92,14 @@ static int warn_of_more(json_t *root, const char *key, const char *key_of_solid,
   return qmat_json_add_warning(root, "the result has more %s than the solid: %zu instead of %zu", what, count, wanted);
 }
 
+/* Warns where solids share spheres: those that touch at a point, or nearly touch. */
+static int warn_of_joined(json_t *root) {
+  const size_t count = count_at(root, "components"), wanted = count_at(root, "components_of_solid");
+  if (!json_object_get(root, "components_of_solid") || count >= wanted) return 0;
+  return qmat_json_add_warning(root, "the result joins components of the solid: it has %zu instead of %zu", count,
+                               wanted);
+}
+
 qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figures *f, const qmat_medial *unit,
                                  const qmat_surface *surface, double epsilon, double deviation, qmat_report *report) {
   const struct {
@@ -134,7 +142,7 @@ qmat_status qmat_simplify_report(qmat_context *context, const qmat_simplify_figu
   if (bad) return qmat_fail_memory(context, "the report");
   const qmat_status status = qmat_topology_report(context, unit, surface, root);
   if (status == QMAT_OK)
-    bad = warn_of_more(root, "loops", "loops_of_solid", "handles") |
+    bad = warn_of_joined(root) | warn_of_more(root, "loops", "loops_of_solid", "handles") |
           warn_of_more(root, "voids", "voids_of_solid", "voids");
   if (bad) return qmat_fail_memory(context, "the report");
   const double error = fmax(epsilon, fmax(f->surface_to_envelope, f->envelope_to_surface));

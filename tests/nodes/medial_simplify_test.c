@@ -830,6 +830,23 @@ static void test_a_void_that_the_solid_does_not_have_is_opened(void **state) {
   qmat_value_release(&closed->base);
 }
 
+/* Two cubes that touch at a corner have a sphere of radius zero there in common. */
+static void test_solids_that_share_a_sphere_are_a_warning(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(1, 1, 1);
+  shape_add_box(mesh, 1, 1, 1, 2, 2, 2, false);
+  pipeline p;
+  pipeline_make(&p, mesh, sampling, "");
+  static const double spheres[] = {0.5, 0.5, 0.5, 0.5, 1, 1, 1, 0, 1.5, 1.5, 1.5, 0.5};
+  static const uint32_t edges[] = {0, 1, 1, 2};
+  qmat_medial *joined = sealed_medial_mesh(spheres, 3, edges, 2, NULL, 0);
+  result r = simplify_medial(&p, joined, "epsilon=0 vertices=3");
+  must_warn(&r, "the result joins components of the solid: it has 1 instead of 2");
+  release(&r);
+  qmat_value_release(&joined->base);
+  pipeline_free(&p);
+}
+
 static void test_a_loop_that_the_solid_does_not_have_is_closed(void **state) {
   (void)state;
   const pipeline *p = model(SMALL);
@@ -1158,6 +1175,7 @@ int main(void) {
       cmocka_unit_test(test_isolated_spheres_stay_beside_what_collapses),
       cmocka_unit_test(test_a_void_that_the_solid_does_not_have_is_opened),
       cmocka_unit_test(test_a_loop_that_the_solid_does_not_have_is_closed),
+      cmocka_unit_test(test_solids_that_share_a_sphere_are_a_warning),
       cmocka_unit_test(test_part_of_a_wall_opens_a_void_that_needs_all_walls),
       cmocka_unit_test(test_part_of_an_edge_opens_a_loop_that_needs_all_edges),
       cmocka_unit_test(test_an_edge_that_is_not_needed_opens_a_loop),

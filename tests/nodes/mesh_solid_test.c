@@ -1640,6 +1640,158 @@ static void test_each_choice_does_what_it_says(void **state) {
   release(&r);
 }
 
+/* ---- the report ---- */
+
+/* Two sides of a square cancel: they are no part, and yet a sheet. Of two cubes that touch, a wall is none. */
+static void test_a_card_whose_sides_coincide_counts_as_a_sheet(void **state) {
+  (void)state;
+  qmat_mesh *card = shape_new();
+  const double corners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  for (uint32_t i = 0; i < 4; i++) shape_vertex(card, corners[i][0], corners[i][1], 0);
+  shape_triangle(card, 0, 1, 2);
+  shape_triangle(card, 0, 2, 3);
+  shape_triangle(card, 2, 1, 0);
+  shape_triangle(card, 3, 2, 0);
+  result r = unite(card);
+  assert_int_equal(pipeline_count(r.report, "parts"), 0);
+  assert_int_equal(pipeline_count(r.report, "sheets"), 1);
+  release(&r);
+  qmat_mesh *cubes = shape_box(1, 1, 1);
+  shape_add_box(cubes, 1, 0, 0, 2, 1, 1, false);
+  weld(cubes);
+  r = unite(cubes);
+  assert_int_equal(pipeline_count(r.report, "sheets"), 0);
+  release(&r);
+}
+
+/* A channel of a square section: its two ends are a seventh of what is given; a box without a lid has a fifth. */
+static void test_a_warning_of_caps_names_the_place_and_a_way_out_where_caps_are_large(void **state) {
+  (void)state;
+  for (int large = 0; large < 2; large++) {
+    qmat_mesh *mesh = large ? shape_box(1, 1, 0.8) : shape_box(1, 1, 3.6);
+    for (size_t t = 0; t < mesh->triangle_count; t++) { /* without what faces up, and down */
+      bool up = true, down = true;
+      for (int k = 0; k < 3; k++) {
+        const double z = mesh->positions[3 * (size_t)mesh->triangles[3 * t + (size_t)k] + 2];
+        up = up && z > 0.5;
+        down = down && z == 0;
+      }
+      if (up || (down && !large)) {
+        mesh->triangle_count--;
+        memmove(mesh->triangles + 3 * t, mesh->triangles + 3 * (t + 1),
+                3 * (mesh->triangle_count - t) * sizeof *mesh->triangles);
+        t--;
+      }
+    }
+    result r = unite(mesh);
+    const char *warning = json_string_value(json_array_get(json_object_get(r.report->root, "warnings"), 0));
+    assert_non_null(warning);
+    assert_non_null(strstr(warning, "(component 1, at ("));
+    assert_int_equal(strstr(warning, "solid.solid=sheet") != NULL, large);
+    release(&r);
+  }
+}
+
+/* ---- flat faces that are folded ---- */
+
+/* A prism over a polygon, turned about the x axis, in single precision. Its ends are the fans of their first corners.
+ */
+static qmat_mesh *fanned_prism(const double (*corners)[2], uint32_t count, double turn) {
+  qmat_mesh *mesh = shape_new();
+  for (uint32_t i = 0; i < 2 * count; i++) {
+    const double x = corners[i % count][0], y = corners[i % count][1], z = i < count ? 0 : 0.6;
+    shape_vertex(mesh, x, (float)(cos(turn) * y - sin(turn) * z), (float)(sin(turn) * y + cos(turn) * z));
+  }
+  for (uint32_t i = 0; i < count; i++) shape_quad(mesh, i, (i + 1) % count, count + (i + 1) % count, count + i);
+  for (uint32_t i = 1; i + 1 < count; i++) {
+    shape_triangle(mesh, 0, i + 1, i);
+    shape_triangle(mesh, count, count + i, count + i + 1);
+  }
+  return mesh;
+}
+
+/* Counterclockwise; the first corner does not see the last but one. */
+static const double letter_l[6][2] = {{3, 1}, {1, 1}, {1, 3}, {0, 3}, {0, 0}, {3, 0}};
+
+/* Some triangles of the fans are turned over and lie outside of the L, others cover them. */
+static void test_a_fanned_concave_face_is_triangulated_again(void **state) {
+  (void)state;
+  for (int turned = 0; turned < 2; turned++) {
+    may_move = turned;
+    result r = unite(fanned_prism(letter_l, 6, turned));
+    assert_int_equal(pipeline_count(r.report, "faces_triangulated_again"), 2);
+    assert_int_equal(r.mesh->vertex_count, 12);
+    assert_int_equal(r.mesh->triangle_count, 20);
+    assert_int_equal(r.mesh->sheet_triangle_count, 0);
+    assert_near(volume_of(r.mesh), 5 * 0.6, 1e-6);
+    assert_near(area_of(r.mesh), 2 * 5 + 12 * 0.6, 1e-6);
+    assert_true(r.mesh->deviation <= 1e-5);
+    assert_null(json_object_get(r.report->root, "warnings"));
+    release(&r);
+  }
+  may_move = false;
+}
+
+/* The bottom is a sheet that is open on all sides. */
+static void test_a_fanned_concave_sheet_is_triangulated_again(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_new();
+  for (uint32_t i = 0; i < 6; i++) shape_vertex(mesh, letter_l[i][0], letter_l[i][1], 0);
+  for (uint32_t i = 1; i < 5; i++) shape_triangle(mesh, 0, i, i + 1);
+  result r = unite(mesh);
+  assert_int_equal(pipeline_count(r.report, "faces_triangulated_again"), 1);
+  assert_int_equal(r.mesh->sheet_triangle_count, 4);
+  assert_near(area_of(r.mesh), 5, 1e-12);
+  release(&r);
+}
+
+/* An ear that is cut off outside of the L is a given triangle; the cap of what is left folds onto it. */
+static void test_a_cap_that_folds_onto_a_badly_cut_ear_is_triangulated_again(void **state) {
+  (void)state;
+  qmat_mesh *mesh = fanned_prism(letter_l, 6, 0);
+  mesh->triangle_count -= 8;
+  shape_triangle(mesh, 0, 2, 1);
+  shape_triangle(mesh, 6, 7, 8);
+  result r = unite_with(mesh, "solid=close");
+  assert_int_equal(pipeline_count(r.report, "faces_triangulated_again"), 2);
+  assert_int_equal(r.mesh->sheet_triangle_count, 0);
+  assert_near(volume_of(r.mesh), 5 * 0.6, 1e-6);
+  assert_near(area_of(r.mesh), 2 * 5 + 12 * 0.6, 1e-6);
+  release(&r);
+}
+
+/* A pentagram is wound twice around its middle: no triangles between its corners have that border. */
+static void test_a_face_that_no_triangles_can_fill_has_a_warning_with_its_place(void **state) {
+  (void)state;
+  double star[5][2];
+  for (int i = 0; i < 5; i++) {
+    star[i][0] = 10 + cos(4 * 3.14159265358979323846 * i / 5);
+    star[i][1] = sin(4 * 3.14159265358979323846 * i / 5);
+  }
+  may_move = true;
+  result r = unite(fanned_prism((const double(*)[2])star, 5, 0));
+  may_move = false;
+  assert_int_equal(pipeline_count(r.report, "faces_triangulated_again"), 0);
+  const char *warning = json_string_value(json_array_get(json_object_get(r.report->root, "warnings"), 0));
+  assert_non_null(warning);
+  assert_non_null(strstr(warning, "2 flat faces with triangles that overlap, the first at ("));
+  assert_non_null(strstr(warning, "solid=wrap"));
+  release(&r);
+}
+
+/* Two sides of a leaf on a box cancel: the border of the side does not enclose the tip, which stays. */
+static void test_a_leaf_of_two_sides_on_a_box_stays(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(1, 1, 1);
+  shape_triangle(mesh, 0, 1, shape_vertex(mesh, 0.5, -1, 0));
+  shape_triangle(mesh, 1, 0, 8);
+  result r = unite(mesh);
+  assert_int_equal(pipeline_count(r.report, "faces_triangulated_again"), 0);
+  assert_int_equal(r.mesh->vertex_count, 9);
+  assert_null(json_object_get(r.report->root, "warnings"));
+  release(&r);
+}
+
 /* ---- without a union ---- */
 
 qmat_status __real_qmat_unite_overlaps(qmat_context *context, size_t vertex_count, const double *positions,
@@ -1738,6 +1890,13 @@ int main(void) {
       cmocka_unit_test(test_units_of_any_size),
       cmocka_unit_test(test_a_union_can_be_stopped),
       cmocka_unit_test(test_a_shortage_of_memory_anywhere_is_an_error_or_makes_no_difference),
+      cmocka_unit_test(test_a_fanned_concave_face_is_triangulated_again),
+      cmocka_unit_test(test_a_fanned_concave_sheet_is_triangulated_again),
+      cmocka_unit_test(test_a_cap_that_folds_onto_a_badly_cut_ear_is_triangulated_again),
+      cmocka_unit_test(test_a_face_that_no_triangles_can_fill_has_a_warning_with_its_place),
+      cmocka_unit_test(test_a_leaf_of_two_sides_on_a_box_stays),
+      cmocka_unit_test(test_a_card_whose_sides_coincide_counts_as_a_sheet),
+      cmocka_unit_test(test_a_warning_of_caps_names_the_place_and_a_way_out_where_caps_are_large),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

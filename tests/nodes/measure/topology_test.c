@@ -301,14 +301,36 @@ static void test_nothing_is_said_of_open_and_branching_surfaces(void **state) {
   (void)state;
   qmat_mesh *mesh = shape_box(1, 1, 1);
   mesh->triangle_count--;
-  assert_false(solid_of(mesh).known);
+  qmat_topology t = solid_of(mesh);
+  assert_false(t.known);
+  assert_string_equal(t.why_not, "the surface is open");
   mesh = shape_box(1, 1, 1); /* two boxes with an edge in common: four triangles at it */
   shape_add_box(mesh, 1, 1, 0, 2, 2, 1, false);
   for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
     if (mesh->triangles[i] == 8) mesh->triangles[i] = 3;
     if (mesh->triangles[i] == 12) mesh->triangles[i] = 7;
   }
-  assert_false(solid_of(mesh).known);
+  t = solid_of(mesh);
+  assert_false(t.known);
+  assert_non_null(strstr(t.why_not, "more than two triangles"));
+}
+
+/* A thin box and a thin ring, taken for sheets, have no void; a box with volume has one. */
+static void test_flat_shells_of_sheets_enclose_no_void(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_box(1, 1, 1e-6);
+  mesh->sheet_triangle_count = mesh->triangle_count;
+  mesh->sheet_thickness = 1e-3;
+  check_solid(mesh, 1, 0, 0);
+  mesh = shape_torus(3, 1, 12, 8);
+  for (size_t v = 0; v < mesh->vertex_count; v++) mesh->positions[3 * v + 2] *= 1e-7;
+  mesh->sheet_triangle_count = mesh->triangle_count;
+  mesh->sheet_thickness = 1e-3;
+  check_solid(mesh, 1, 1, 0);
+  mesh = shape_box(1, 1, 1);
+  mesh->sheet_triangle_count = mesh->triangle_count;
+  mesh->sheet_thickness = 1e-3;
+  check_solid(mesh, 1, 0, 1);
 }
 
 int main(void) {
@@ -325,6 +347,7 @@ int main(void) {
       cmocka_unit_test(test_an_island_in_a_void_is_a_component),
       cmocka_unit_test(test_boxes_that_meet_in_a_corner_are_apart),
       cmocka_unit_test(test_nothing_is_said_of_open_and_branching_surfaces),
+      cmocka_unit_test(test_flat_shells_of_sheets_enclose_no_void),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
