@@ -456,19 +456,20 @@ static qmat_status read_bytes(qmat_context *context, const char *path, char **te
 
 qmat_status qmat_graph_read_file(qmat_context *context, const qmat_registry *registry, const char *path,
                                  qmat_graph *graph) {
-  return qmat_graph_read_file_all(context, registry, path, NULL, graph);
+  return qmat_graph_read_file_all(context, registry, path, NULL, NULL, graph);
 }
 
 qmat_status qmat_graph_read_file_all(qmat_context *context, const qmat_registry *registry, const char *path,
-                                     qmat_mistake_fn *mistake, qmat_graph *graph) {
+                                     const char *stream, qmat_mistake_fn *mistake, qmat_graph *graph) {
   *graph = (qmat_graph){0};
   char *text;
   size_t size = 0;
   qmat_status status = read_bytes(context, path, &text, &size);
   if (status != QMAT_OK) return status;
-  const char *slash = strrchr(path, '/');
-  status = read_text(context, registry, path, path, slash ? (size_t)(slash - path) + 1 : 0, text, size, mistake, graph);
+  const char *slash = stream ? NULL : strrchr(path, '/');
+  const size_t folder_length = slash ? (size_t)(slash - path) + 1 : 0;
+  status = read_text(context, registry, stream ? stream : path, path, folder_length, text, size, mistake, graph);
   qmat_free(text);
-  graph->is_file = status == QMAT_OK;
+  graph->is_file = status == QMAT_OK && !stream;
   return status;
 }
