@@ -315,10 +315,10 @@ static qmat_status check_inputs(qmat_context *context, const qmat_node *node, co
     if (!value && port->optional) continue;
     if (value && value->sealed && fits(port, value)) continue;
     if (!value) {
-      qmat_fail(context, QMAT_ERROR_USAGE, "a %s must be given", qmat_value_type_name(port->type));
+      qmat_fail(context, QMAT_ERROR_USAGE, "%s must be given", qmat_value_type_phrase(port->type));
     } else if (value->sealed && !fits(port, value)) {
-      qmat_fail(context, QMAT_ERROR_USAGE, "a %s is given, not a %s", qmat_value_type_name(value->type),
-                qmat_value_type_name(port->type));
+      qmat_fail(context, QMAT_ERROR_USAGE, "%s is given, not %s", qmat_value_type_phrase(value->type),
+                qmat_value_type_phrase(port->type));
     } else {
       qmat_fail(context, QMAT_ERROR_USAGE, "the %s is not sealed", qmat_value_type_name(port->type));
     }

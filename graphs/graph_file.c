@@ -176,8 +176,8 @@ static void suggest_type(graph_reader *reader, qmat_value_type wanted, size_t bu
     const qmat_node *type = graph->nodes[i].type;
     for (size_t port = 0; i != but_not && port < qmat_output_count(type); port++)
       if (type->outputs[port].type == wanted) {
-        qmat_fail_hint(reader->context, "'%s.%s' is a %s", graph->nodes[i].id, type->outputs[port].name,
-                       qmat_value_type_name(wanted));
+        qmat_fail_hint(reader->context, "'%s.%s' is %s", graph->nodes[i].id, type->outputs[port].name,
+                       qmat_value_type_phrase(wanted));
         return;
       }
   }
@@ -211,8 +211,9 @@ static qmat_status read_link(graph_reader *reader, size_t index, const qmat_tree
   qmat_value_type wanted = node->type->inputs[port].type;
   qmat_value_type given = graph->nodes[found.node].type->outputs[found.port].type;
   if (given != wanted) {
-    qmat_fail(reader->context, QMAT_ERROR_USAGE, "input '%s' of node '%s' takes a %s, but '%s' is a %s", entry->key,
-              node->id, qmat_value_type_name(wanted), qmat_show(entry->value->text).text, qmat_value_type_name(given));
+    qmat_fail(reader->context, QMAT_ERROR_USAGE, "input '%s' of node '%s' takes %s, but '%s' is %s", entry->key,
+              node->id, qmat_value_type_phrase(wanted), qmat_show(entry->value->text).text,
+              qmat_value_type_phrase(given));
     suggest_type(reader, wanted, index);
     return at_mark(reader, entry->value->mark);
   }

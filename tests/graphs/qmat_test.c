@@ -102,6 +102,8 @@ static void test_a_mesh_in_memory_becomes_spheres_inside_it(void **state) {
   assert_int_equal(mesh.vertex_count, VERTICES);
   assert_int_equal(mesh.triangle_count, TRIANGLES);
   qmat_medial_view medial;
+  assert_int_equal(qmat_job_mesh(job, "simple.medial", &mesh), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "'simple.medial' is a medial mesh, not a mesh"));
   ok(job, qmat_job_medial(job, "simple.medial", &medial));
   assert_true(medial.sphere_count >= 1 && medial.sphere_count < VERTICES);
   double tolerance = 0.03 * 4 * sqrt(3), largest = 0;
