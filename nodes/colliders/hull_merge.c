@@ -390,7 +390,8 @@ static qmat_status set_vertices(const merging *m, part *p, double *points, size_
   size_t apart = qmat_hull_vertices_apart(points, count, least_gap(m)), triangles;
   if (apart == count) return QMAT_OK;
   const qmat_status status = qmat_convex_hull(points, apart, j->triangles, &triangles);
-  if (status != QMAT_OK) return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
+  if (status == QMAT_ERROR_GEOMETRY) return QMAT_OK;
+  if (status != QMAT_OK) return status;
   memcpy(p->points, points, 3 * apart * sizeof *points);
   p->count = qmat_hull_vertices_keep(p->points, apart, j->triangles, triangles, j->is_vertex);
   qmat_hull_box(p->points, p->count, p->low, p->high);
