@@ -399,11 +399,12 @@ static qmat_status set_vertices(const merging *m, part *p, double *points, size_
 }
 
 /* Makes of points a hull with as few vertices as it may have: triangles or half-spaces, whichever has the smaller
- * volume. It is as much larger as it may lose where vertices are too near to each other. */
-static qmat_status reduce_points(const merging *m, part *p, joint *j) {
+ * volume. It contains all within `gap` of them: as much as it may lose where vertices are too near to each other. With
+ * 0 they may not be: `*again` tells where they are, and the points stay. */
+static qmat_status reduce_points(const merging *m, part *p, double gap, joint *j, bool *again) {
   const qmat_tangent_hull *coarse = &j->coarse;
   const qmat_outer_hull *outer = &j->outer;
-  const double margin = margin_of(m) + least_gap(m);
+  const double margin = margin_of(m) + gap;
   double of_outer = INFINITY;
   size_t triangles;
   qmat_status status = surround(&j->coarse, p->points, p->count, margin, m->error);
@@ -415,8 +416,10 @@ static qmat_status reduce_points(const merging *m, part *p, joint *j) {
   if (status == QMAT_OK) of_outer = qmat_hull_volume(outer->points, j->triangles, triangles);
   if (status != QMAT_OK && status != QMAT_ERROR_GEOMETRY) return status;
   const bool is_outer = of_outer < of_coarse;
-  return is_outer ? set_vertices(m, p, outer->points, outer->point_count, j)
-                  : set_vertices(m, p, coarse->points, coarse->point_count, j);
+  double *vertices = is_outer ? outer->points : coarse->points;
+  const size_t count = is_outer ? outer->point_count : coarse->point_count;
+  *again = gap == 0 && qmat_hull_vertices_apart(vertices, count, least_gap(m)) < count;
+  return *again ? QMAT_OK : set_vertices(m, p, vertices, count, j);
 }
 
 /* Makes the hulls around the pieces in place of the parts. */
@@ -439,7 +442,10 @@ static qmat_status make_hulls(merging *m) {
   }
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(max : worst)
   for (size_t i = 0; i < count; i++) {
-    const int status = (int)reduce_points(m, &m->ends[i], &m->joints[omp_get_thread_num()]);
+    joint *j = &m->joints[omp_get_thread_num()];
+    bool again;
+    int status = (int)reduce_points(m, &m->ends[i], 0, j, &again);
+    if (status == QMAT_OK && again) status = (int)reduce_points(m, &m->ends[i], least_gap(m), j, &again);
     worst = status > worst ? status : worst;
   }
   return fail(m, (qmat_status)worst);
