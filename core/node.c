@@ -271,10 +271,15 @@ static double find_diagonal(const qmat_node *node, const qmat_value *const input
   return 0;
 }
 
+/* Writes a length as people type it: "5mm", "0.5m". */
+static void format_meters(double meters, char *text, size_t size) {
+  const bool is_small = meters < 0.1;
+  snprintf(text, size, "%.9g%s", is_small ? 1000 * meters : meters, is_small ? "mm" : "m");
+}
+
 static qmat_status fail_unit(qmat_context *context, const qmat_param *param, const char *text) {
   qmat_fail(context, QMAT_ERROR_USAGE, "%s is %s, but the model has no unit of length", param->name, text);
-  qmat_fail_hint(context,
-                 "type a share of the diagonal, such as 1%%, or state the file's unit; qmat mat: --set model.unit=mm");
+  qmat_fail_hint(context, "type a share of the diagonal, such as 1%%" QMAT_UNIT_ADVICE);
   return qmat_fail_field(context, param->name);
 }
 
@@ -287,7 +292,7 @@ static qmat_status resolve_lengths(qmat_context *context, const qmat_node *node,
     double *value = slot(param, params);
     if (param->type != QMAT_PARAM_FLOAT || !qmat_param_in_meters(param, *value)) continue;
     char text[48];
-    qmat_param_format(param, params, text, sizeof text);
+    format_meters(-*value, text, sizeof text);
     if (!(diagonal > 0 && isfinite(diagonal))) return fail_unit(context, param, text);
     *value = -*value / diagonal;
     if (float_in_range(param, *value)) continue;
@@ -310,10 +315,10 @@ static qmat_status check_inputs(qmat_context *context, const qmat_node *node, co
     if (!value && port->optional) continue;
     if (value && value->sealed && fits(port, value)) continue;
     if (!value) {
-      qmat_fail(context, QMAT_ERROR_USAGE, "a %s must be given", qmat_value_type_name(port->type));
+      qmat_fail(context, QMAT_ERROR_USAGE, "%s must be given", qmat_value_type_phrase(port->type));
     } else if (value->sealed && !fits(port, value)) {
-      qmat_fail(context, QMAT_ERROR_USAGE, "a %s is given, not a %s", qmat_value_type_name(value->type),
-                qmat_value_type_name(port->type));
+      qmat_fail(context, QMAT_ERROR_USAGE, "%s is given, not %s", qmat_value_type_phrase(value->type),
+                qmat_value_type_phrase(port->type));
     } else {
       qmat_fail(context, QMAT_ERROR_USAGE, "the %s is not sealed", qmat_value_type_name(port->type));
     }

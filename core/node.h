@@ -8,6 +8,9 @@
 
 #include "core/value.h"
 
+/* The end of the hint where a length has a unit and the model has none. A runner fits it to its graph. */
+#define QMAT_UNIT_ADVICE ", or state the file's unit; qmat mat: --set model.unit=mm"
+
 /* A node is one constant descriptor at the end of its file. Defaults, parsing, range errors, help, the list of nodes
  * and the generated tests are all derived from it. */
 

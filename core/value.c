@@ -120,6 +120,16 @@ const char *qmat_value_type_name(qmat_value_type type) {
   return (unsigned)type < QMAT_VALUE_TYPE_COUNT ? qmat_value_layouts[type].name : "unknown";
 }
 
+const char *qmat_value_type_phrase(qmat_value_type type) {
+#define QMAT_PHRASE(NAME, name) [QMAT_##NAME] = "a " #name,
+  static const char *const phrases[QMAT_VALUE_TYPE_COUNT] = {QMAT_VALUE_TYPES(QMAT_PHRASE)[QMAT_LIST] = "a list"};
+#undef QMAT_PHRASE
+  if (type == QMAT_MEDIAL) return "a medial mesh";
+  if (type == QMAT_SAMPLES) return "a set of samples";
+  if (type == QMAT_COLLIDERS) return "a set of colliders";
+  return (unsigned)type < QMAT_VALUE_TYPE_COUNT ? phrases[type] : "unknown";
+}
+
 bool qmat_value_array_at(const qmat_value *value, size_t index, qmat_value_array *array) {
   for (const qmat_value_row *row = qmat_value_rows(value); row->name; row++) {
     const bool is_ids = row->kind == QMAT_ROW_U32;

@@ -42,6 +42,8 @@ const char *qmat_value_failure(const qmat_value *value);
 
 /* "mesh", "medial", ...; "unknown" for a number that is no type. */
 const char *qmat_value_type_name(qmat_value_type type);
+/* The same as people say it: "a mesh", "a medial mesh", "a set of samples". */
+const char *qmat_value_type_phrase(qmat_value_type type);
 
 /* The bytes that the value's arrays, texts and files occupy, without lists of names; a list's are those of its items.
  */

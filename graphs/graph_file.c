@@ -176,8 +176,8 @@ static void suggest_type(graph_reader *reader, qmat_value_type wanted, size_t bu
     const qmat_node *type = graph->nodes[i].type;
     for (size_t port = 0; i != but_not && port < qmat_output_count(type); port++)
       if (type->outputs[port].type == wanted) {
-        qmat_fail_hint(reader->context, "'%s.%s' is a %s", graph->nodes[i].id, type->outputs[port].name,
-                       qmat_value_type_name(wanted));
+        qmat_fail_hint(reader->context, "'%s.%s' is %s", graph->nodes[i].id, type->outputs[port].name,
+                       qmat_value_type_phrase(wanted));
         return;
       }
   }
@@ -211,8 +211,9 @@ static qmat_status read_link(graph_reader *reader, size_t index, const qmat_tree
   qmat_value_type wanted = node->type->inputs[port].type;
   qmat_value_type given = graph->nodes[found.node].type->outputs[found.port].type;
   if (given != wanted) {
-    qmat_fail(reader->context, QMAT_ERROR_USAGE, "input '%s' of node '%s' takes a %s, but '%s' is a %s", entry->key,
-              node->id, qmat_value_type_name(wanted), qmat_show(entry->value->text).text, qmat_value_type_name(given));
+    qmat_fail(reader->context, QMAT_ERROR_USAGE, "input '%s' of node '%s' takes %s, but '%s' is %s", entry->key,
+              node->id, qmat_value_type_phrase(wanted), qmat_show(entry->value->text).text,
+              qmat_value_type_phrase(given));
     suggest_type(reader, wanted, index);
     return at_mark(reader, entry->value->mark);
   }
@@ -456,19 +457,20 @@ static qmat_status read_bytes(qmat_context *context, const char *path, char **te
 
 qmat_status qmat_graph_read_file(qmat_context *context, const qmat_registry *registry, const char *path,
                                  qmat_graph *graph) {
-  return qmat_graph_read_file_all(context, registry, path, NULL, graph);
+  return qmat_graph_read_file_all(context, registry, path, NULL, NULL, graph);
 }
 
 qmat_status qmat_graph_read_file_all(qmat_context *context, const qmat_registry *registry, const char *path,
-                                     qmat_mistake_fn *mistake, qmat_graph *graph) {
+                                     const char *stream, qmat_mistake_fn *mistake, qmat_graph *graph) {
   *graph = (qmat_graph){0};
   char *text;
   size_t size = 0;
   qmat_status status = read_bytes(context, path, &text, &size);
   if (status != QMAT_OK) return status;
-  const char *slash = strrchr(path, '/');
-  status = read_text(context, registry, path, path, slash ? (size_t)(slash - path) + 1 : 0, text, size, mistake, graph);
+  const char *slash = stream ? NULL : strrchr(path, '/');
+  const size_t folder_length = slash ? (size_t)(slash - path) + 1 : 0;
+  status = read_text(context, registry, stream ? stream : path, path, folder_length, text, size, mistake, graph);
   qmat_free(text);
-  graph->is_file = status == QMAT_OK;
+  graph->is_file = status == QMAT_OK && !stream;
   return status;
 }

@@ -27,9 +27,10 @@ qmat_status qmat_graph_read_file(qmat_context *context, const qmat_registry *reg
 typedef void qmat_mistake_fn(const qmat_error *error);
 
 /* The same, but goes on after a mistake: the last one is the error. What follows from an earlier mistake is left out.
- * At most 51 are told. `mistake` may be NULL: the first is the only one. */
+ * At most 51 are told. `mistake` may be NULL: the first is the only one. `stream` is NULL, or what errors call the
+ * standard input that `path` has a copy of: relative paths are then relative to the working folder. */
 qmat_status qmat_graph_read_file_all(qmat_context *context, const qmat_registry *registry, const char *path,
-                                     qmat_mistake_fn *mistake, qmat_graph *graph);
+                                     const char *stream, qmat_mistake_fn *mistake, qmat_graph *graph);
 
 /* qmat_graph_read_file for `size` bytes of text. Errors call it `file`; relative paths are not resolved. */
 qmat_status qmat_graph_read_text(qmat_context *context, const qmat_registry *registry, const char *file,

@@ -45,8 +45,8 @@ qmat_status qmat_graph_output_format(qmat_context *context, const qmat_graph *gr
     if (!format) return QMAT_OK;
     endings = format->choices;
   } else {
-    qmat_fail(context, QMAT_ERROR_USAGE, "output '%s' is a %s, but only files and reports can be saved", output->name,
-              qmat_value_type_name(made));
+    qmat_fail(context, QMAT_ERROR_USAGE, "output '%s' is %s, but only files and reports can be saved", output->name,
+              qmat_value_type_phrase(made));
     return qmat_fail_hint(context, "scene.write makes files");
   }
   const char *ending = path_ending(path);

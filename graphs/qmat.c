@@ -233,8 +233,8 @@ static qmat_status find_given_port(qmat_job *job, const char *port, qmat_value_t
   if (status != QMAT_OK) return status;
   const qmat_value_type takes = job->graph.nodes[*node].type->outputs[*index].type;
   if (takes == type) return QMAT_OK;
-  return qmat_fail(&job->context, QMAT_ERROR_USAGE, "'%s' is a %s, not a %s", port, qmat_value_type_name(takes),
-                   qmat_value_type_name(type));
+  return qmat_fail(&job->context, QMAT_ERROR_USAGE, "'%s' is %s, not %s", port, qmat_value_type_phrase(takes),
+                   qmat_value_type_phrase(type));
 }
 
 qmat_result qmat_job_give_mesh(qmat_job *job, const char *port, const char *name, const double *positions,
@@ -511,8 +511,8 @@ static qmat_status find_single(qmat_job *job, const char *port, qmat_value_type 
     return qmat_fail_hint(context, "name one as %s[0], or set model.mesh to the name of a mesh, or to merged", port);
   }
   if ((*value)->type != type)
-    return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is a %s, not a %s", port, qmat_value_type_name((*value)->type),
-                     qmat_value_type_name(type));
+    return qmat_fail(context, QMAT_ERROR_USAGE, "'%s' is %s, not %s", port, qmat_value_type_phrase((*value)->type),
+                     qmat_value_type_phrase(type));
   return QMAT_OK;
 }
 

@@ -105,34 +105,100 @@ static qmat_status decode_node(qmat_context *context, const json_t *node, qmat_m
   return status;
 }
 
+/* The number of nodes with each name, by name; NULL if memory is short. */
+static json_t *count_names(const json_t *nodes) {
+  json_t *counts = json_object();
+  bool done = counts != NULL;
+  for (size_t i = 0; i < json_array_size(nodes) && done; i++) {
+    const char *name = json_string_value(json_object_get(json_array_get(nodes, i), "name"));
+    if (!name) continue;
+    const json_int_t before = json_integer_value(json_object_get(counts, name));
+    done = json_object_set_new(counts, name, json_integer(before + 1)) == 0;
+  }
+  if (done) return counts;
+  json_decref(counts);
+  return NULL;
+}
+
+/* What qmat_medial_extract finds a node by: its name, or its number where it has none of its own. NULL if memory is
+ * short. */
+static json_t *call_node(const json_t *nodes, size_t index, const json_t *name_counts) {
+  const char *name = json_string_value(json_object_get(json_array_get(nodes, index), "name"));
+  const bool alone = name && json_integer_value(json_object_get(name_counts, name)) == 1;
+  return alone ? json_string(name) : json_sprintf("%zu", index);
+}
+
+/* The nodes with a medial mesh that have a name or number, or, where none has, those whose parent has it: far from zero
+ * the medial mesh is on a child of the mesh's node. */
+typedef struct carriers {
+  size_t count, different; /* all that have one; different ones of the name */
+  size_t index;            /* of the first of the name; SIZE_MAX: none */
+} carriers;
+
+static carriers find_carriers(const json_t *root, const char *name, bool by_parent) {
+  const json_t *nodes = json_object_get(root, "nodes");
+  carriers found = {.index = SIZE_MAX};
+  for (size_t i = 0; i < json_array_size(nodes); i++) {
+    const json_t *data = data_of(json_array_get(nodes, i));
+    if (!data) continue;
+    found.count++;
+    const size_t called = by_parent ? qmat_gltf_parent_of(root, i) : i;
+    if (called == SIZE_MAX || (name && !is_called(nodes, called, name))) continue;
+    if (by_parent && qmat_gltf_mesh_of(json_array_get(nodes, called)) < 0) continue;
+    /* Nodes that share a mesh carry the same medial mesh. */
+    found.different +=
+        found.index == SIZE_MAX ||
+        !json_equal((json_t *)(uintptr_t)data_of(json_array_get(nodes, found.index)), (json_t *)(uintptr_t)data);
+    if (found.index == SIZE_MAX) found.index = i;
+  }
+  return found;
+}
+
+/* No node with a medial mesh has the name: the hint lists those that have one. */
+static qmat_status fail_name(qmat_context *context, const json_t *root, const char *path, const char *name) {
+  const json_t *nodes = json_object_get(root, "nodes");
+  const bool is_number = name[0] && name[strspn(name, "0123456789")] == 0;
+  char list[160] = "";
+  size_t used = 0;
+  json_t *counts = count_names(nodes);
+  if (!counts) return qmat_fail_memory(context, "the names of nodes");
+  for (size_t i = 0; i < json_array_size(nodes) && used < sizeof list; i++) {
+    if (!data_of(json_array_get(nodes, i))) continue;
+    json_t *called = call_node(nodes, i, counts);
+    const char *text = called ? json_string_value(called) : "";
+    const size_t left = sizeof list - used, length = strlen(text) + (used > 0 ? 2 : 0);
+    if (length + sizeof ", ..." > left)
+      used += (size_t)snprintf(list + used, left, "%s...", used > 0 ? ", " : "") + sizeof list;
+    else
+      used += (size_t)snprintf(list + used, left, "%s%s", used > 0 ? ", " : "", text);
+    json_decref(called);
+  }
+  json_decref(counts);
+  qmat_fail(context, QMAT_ERROR_GEOMETRY,
+            is_number ? "node %s has no medial mesh" : "no node of this name has a medial mesh", name);
+  qmat_fail_hint(context, "these have one: %s", list);
+  return qmat_fail_at(context, path, 0, 0);
+}
+
 static qmat_status read_gltf(qmat_context *context, const qmat_bytes *bytes, const char *path, const char *name,
                              qmat_medial **medial, json_t *facts) {
   qmat_gltf_asset asset;
   qmat_status status = qmat_gltf_asset_init(context, bytes->data, bytes->size, path, &asset);
-  const json_t *nodes = json_object_get(asset.root, "nodes"), *found = NULL;
-  size_t carriers = 0, different = 0, index = 0;
-  for (size_t i = 0; i < json_array_size(nodes); i++) {
-    const json_t *node = json_array_get(nodes, i), *data = data_of(node);
-    if (!data) continue;
-    carriers++;
-    if (name && !is_called(nodes, i, name)) continue;
-    /* Nodes that share a mesh carry the same medial mesh. */
-    different += !found || !json_equal((json_t *)(uintptr_t)data_of(found), (json_t *)(uintptr_t)data);
-    if (found) continue;
-    found = node;
-    index = i;
-  }
-  if (status == QMAT_OK && !found) {
-    status = qmat_fail(context, QMAT_ERROR_GEOMETRY,
-                       carriers > 0 ? "no node of this name has a medial mesh" : "no node has a medial mesh");
+  carriers chosen = find_carriers(asset.root, name, false);
+  if (name && chosen.index == SIZE_MAX) chosen = find_carriers(asset.root, name, true);
+  const json_t *found = json_array_get(json_object_get(asset.root, "nodes"), chosen.index);
+  if (status == QMAT_OK && name && !found && chosen.count > 0) {
+    status = fail_name(context, asset.root, path, name);
+  } else if (status == QMAT_OK && !found) {
+    status = qmat_fail(context, QMAT_ERROR_GEOMETRY, "no node has a medial mesh");
     qmat_fail_at(context, path, 0, 0);
-  } else if (status == QMAT_OK && different > 1) {
-    status = qmat_fail(context, QMAT_ERROR_USAGE, "%zu nodes have a medial mesh; choose one", carriers);
+  } else if (status == QMAT_OK && chosen.different > 1) {
+    status = qmat_fail(context, QMAT_ERROR_USAGE, "%zu nodes have a medial mesh; choose one", chosen.count);
     qmat_fail_at(context, path, 0, 0);
     qmat_fail_hint(context, "give the name or number of the node; qmat info lists them");
   } else if (status == QMAT_OK) {
     status = decode_node(context, found, medial);
-    if (status != QMAT_OK) qmat_fail_element(context, "node", (int64_t)index);
+    if (status != QMAT_OK) qmat_fail_element(context, "node", (int64_t)chosen.index);
     if (status == QMAT_OK) status = take_facts(context, json_object_get(found, "extras"), facts);
     if (status != QMAT_OK) qmat_fail_at(context, path, 0, 0);
   }
@@ -189,28 +255,10 @@ qmat_status qmat_medial_extract(qmat_context *context, const char *path, const c
   return status;
 }
 
-/* The number of nodes with each name, by name; NULL if memory is short. */
-static json_t *count_names(const json_t *nodes) {
-  json_t *counts = json_object();
-  bool done = counts != NULL;
-  for (size_t i = 0; i < json_array_size(nodes) && done; i++) {
-    const char *name = json_string_value(json_object_get(json_array_get(nodes, i), "name"));
-    if (!name) continue;
-    const json_int_t before = json_integer_value(json_object_get(counts, name));
-    done = json_object_set_new(counts, name, json_integer(before + 1)) == 0;
-  }
-  if (done) return counts;
-  json_decref(counts);
-  return NULL;
-}
-
 /* The entry of a node in qmat_medial_carriers; NULL if memory is short. */
 static json_t *describe_carrier(const json_t *root, size_t index, const json_t *name_counts) {
   const json_t *node = json_array_get(json_object_get(root, "nodes"), index);
-  const char *name = json_string_value(json_object_get(node, "name"));
-  const bool alone = name && json_integer_value(json_object_get(name_counts, name)) == 1;
-  json_t *carrier = json_object();
-  json_t *text = alone ? json_string(name) : json_sprintf("%zu", index);
+  json_t *carrier = json_object(), *text = call_node(json_object_get(root, "nodes"), index, name_counts);
   int64_t mesh = qmat_gltf_mesh_of(node);
   if (mesh < 0) { /* far from zero the medial mesh is on a child of the node */
     const size_t parent = qmat_gltf_parent_of(root, index);

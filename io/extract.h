@@ -9,8 +9,9 @@
 /* Extracts the medial mesh from a file: glTF (qmat_data in the extras of a node, else
  * qmat_flat; where a node has both, they are compared), USD (as io/usd/usd_write.h writes
  * it), PLY (as io/mesh/ply_medial.h writes it), or .ma. Its frame is that of the original model or mesh: the local
- * frame of the node or prim, translated by the origin stated in the file. `name` is the name of the node or prim, NULL
- * if there is only one; PLY and .ma ignore it. `facts` (a JSON object, may be NULL) gains the extras or customData
+ * frame of the node or prim, translated by the origin stated in the file. `name` is the name or number of the node
+ * (or of its parent with the mesh, where that one has none) or the name of the prim, NULL if there is only one; PLY and
+ * .ma ignore it. `facts` (a JSON object, may be NULL) gains the extras or customData
  * whose keys start with qmat_, except the data. Stated counts are checked against the actual ones. `*medial` is sealed;
  * the caller releases it; NULL on failure. QMAT_ERROR_FORMAT; QMAT_ERROR_GEOMETRY: there is no medial mesh;
  * QMAT_ERROR_USAGE: there are several and `name` is NULL; QMAT_ERROR_IO; QMAT_ERROR_MEMORY. One thread. Cost: linear.

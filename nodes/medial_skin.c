@@ -24,6 +24,9 @@ static const double SPACING_RADIUS = 2e-3, LEAST_BALL = 1e-6;
 
 enum { METHOD_ENVELOPE, METHOD_SKIN_SURFACE };
 
+/* Cells are halved at most so often. */
+enum { MOST_DETAIL = 6 };
+
 typedef struct medial_skin_params {
   int method;
   int64_t resolution, detail, subdivisions, triangles;
@@ -45,6 +48,7 @@ typedef struct skin {
   qmat_envelope *envelope; /* of `solid` */
   qmat_skin_triangles surface;
   qmat_envelope_grid grid;
+  int detail;                    /* of the grid: less than asked for where that would be too many cells */
   size_t contour_triangle_count; /* before decimation */
   qmat_skin_errors errors;
   double to_envelope, from_envelope; /* upper bounds of the distances between the mesh and the envelope */
@@ -446,9 +450,17 @@ static qmat_status make_envelope_surface(skin *s) {
     status = make_contour(s, detail, may_be_coarser ? MOST_CONTOUR_CELLS : SIZE_MAX, &s->surface, &s->grid);
     if (status != QMAT_OK || !s->grid.is_too_fine) break;
   }
+  s->detail = detail;
   s->contour_triangle_count = s->surface.triangle_count;
   if (status == QMAT_OK && p->error > 0) status = refine_contour(s, detail);
   return status == QMAT_OK && p->error > 0 ? decimate_contour(s, detail) : status;
+}
+
+/* A larger `detail` that may bring the mesh closer; 0: none. */
+static int finer_detail(const skin *s) {
+  const int given = (int)s->params->detail;
+  if (s->detail < given || given == MOST_DETAIL || 2 * s->grid.cell_count > MOST_CONTOUR_CELLS) return 0;
+  return given + 2 < MOST_DETAIL ? given + 2 : MOST_DETAIL;
 }
 
 /* Says that the mesh has more triangles, or is farther from the envelope, than it should. Nonzero when memory is
@@ -461,12 +473,12 @@ static int add_warning(const skin *s, json_t *root) {
                                  "its topology",
                                  (long long)count, (long long)most);
   if (most > 0 || distance_of(s) <= s->params->error) return 0;
-  char distance[48];
+  char distance[48], advice[48] = "";
+  const int detail = finer_detail(s);
   qmat_format_bound(distance_of(s), distance);
-  return qmat_json_add_warning(root,
-                               "the visible mesh is up to %s of the diagonal from the envelope, not %.2g %%; a finer "
-                               "one: --set skin.detail=%d",
-                               distance, 100 * s->params->error, (int)s->params->detail + 2);
+  if (detail > 0) snprintf(advice, sizeof advice, "; a finer one: --set skin.detail=%d", detail);
+  return qmat_json_add_warning(root, "the visible mesh is up to %s of the diagonal from the envelope, not %.2g %%%s",
+                               distance, 100 * s->params->error, advice);
 }
 
 /* Bounds the distances of a surface for which no error was asked, as sharply as for one of the largest distance found:
@@ -586,7 +598,7 @@ static const qmat_param params[] = {
               "The envelope of spheres, cones and slabs, or CGAL's skin surface of balls that fill it"),
     QMAT_INT(medial_skin_params, resolution, "cells", 96, 8, 2048,
              "envelope: largest cells along the diagonal of the envelope's bounding box"),
-    QMAT_INT(medial_skin_params, detail, "halvings", 4, 0, 6,
+    QMAT_INT(medial_skin_params, detail, "halvings", 4, 0, MOST_DETAIL,
              "envelope: cells are halved up to this many times where medial radii are small or crevices narrow; less "
              "often where that makes more than 300,000 cells"),
     QMAT_LENGTH(medial_skin_params, error, 2e-3, 0, 0.1,

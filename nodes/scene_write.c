@@ -430,6 +430,17 @@ static qmat_status count_instanced(qmat_context *context, const qmat_scene *scen
   return status;
 }
 
+/* The first parameter that is set for colliders; NULL: none. */
+static const char *idle_collider_param(const scene_write_params *params) {
+  if (params->fixed) return "fixed";
+  if (is_usd(params)) return NULL; /* the others are of glTF */
+  return params->khr_physics    ? "khr_physics"
+         : params->omi_physics  ? "omi_physics"
+         : params->unreal_hulls ? "unreal_hulls"
+         : params->godot_hulls  ? "godot_hulls"
+                                : NULL;
+}
+
 /* Warns of places and units that are not the scene's, and of colliders that a layer over a USD scene leaves out, since
  * no prim in it moves with a joint. */
 static qmat_status add_warnings(qmat_context *context, const scene_write_params *params,
@@ -440,15 +451,22 @@ static qmat_status add_warnings(qmat_context *context, const scene_write_params 
   int bad = 0;
   size_t instanced = 0;
   qmat_status status = is_alone(params, scene) ? find_moved(context, scene, &moved) : QMAT_OK;
-  if (status == QMAT_OK && inputs[IN_COLLIDERS] && params->format <= FORMAT_GLTF && keeps_scene(params, scene))
-    status = count_instanced(context, scene, &instanced);
+  const bool in_scene = inputs[IN_COLLIDERS] && params->format <= FORMAT_GLTF && keeps_scene(params, scene);
+  const bool is_merged = in_scene && scene->mesh_count == 0;
+  if (status == QMAT_OK && in_scene) status = count_instanced(context, scene, &instanced);
   if (status != QMAT_OK) return status;
   if (instanced > 0)
     bad |= qmat_json_add_warning(
         report,
-        "colliders are not repeated for the instances of EXT_mesh_gpu_instancing: each of %zu nodes "
-        "with instances has one body",
-        instanced);
+        "colliders are not repeated for the instances of EXT_mesh_gpu_instancing: %s%zu node%s with instances has one "
+        "body",
+        instanced == 1 ? "" : "each of ", instanced, instanced == 1 ? "" : "s");
+  if (is_merged && !params->fixed && ((const qmat_colliders *)inputs[IN_COLLIDERS])->body_count > 0)
+    bad |= qmat_json_add_warning(report,
+                                 "the body of all meshes together moves alone: the scene's own meshes stay where their "
+                                 "nodes are; --set asset.fixed=true makes a body that does not move");
+  const char *idle = inputs[IN_COLLIDERS] || holds_no_scene(params) ? NULL : idle_collider_param(params);
+  if (idle) bad |= qmat_json_add_warning(report, "%s has no effect without colliders; qmat mat: --colliders", idle);
   if (moved)
     bad |= qmat_json_add_warning(report,
                                  "the .%s file has the mesh where its own coordinates are, not where the scene's nodes "

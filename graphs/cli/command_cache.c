@@ -162,9 +162,11 @@ static qmat_status verify(cache_call *call) {
   else
     printf("%zu checked, %zu broken, %zu incomplete\n", checked, broken, incomplete);
   if (status == QMAT_OK && broken > 0)
-    status = qmat_fail(call->context, QMAT_ERROR_IO, "%zu files of the cache were damaged", broken);
+    status = qmat_fail(call->context, QMAT_ERROR_IO, "%zu file%s of the cache %s damaged", broken,
+                       broken == 1 ? "" : "s", broken == 1 ? "was" : "were");
   if (status == QMAT_OK && unreadable > 0)
-    status = qmat_fail(call->context, QMAT_ERROR_IO, "%zu files of the cache cannot be read", unreadable);
+    status = qmat_fail(call->context, QMAT_ERROR_IO, "%zu file%s of the cache cannot be read", unreadable,
+                       unreadable == 1 ? "" : "s");
   return status;
 }
 

@@ -61,14 +61,26 @@ static qmat_status add_inputs(qmat_context *context, qmat_invocation *invocation
   return status;
 }
 
-static qmat_status add_output(qmat_context *context, qmat_invocation *invocation, const qmat_graph *graph) {
+static bool has_output(const qmat_graph *graph, const char *name) {
+  for (size_t i = 0; i < graph->output_count; i++)
+    if (strcmp(graph->outputs[i].name, name) == 0) return true;
+  return false;
+}
+
+static qmat_status add_output(qmat_context *context, qmat_invocation *invocation, const qmat_graph *graph,
+                              const qmat_graph *colliders) {
   char *doc = invocation->docs[invocation->option_count];
   size_t used = (size_t)snprintf(doc, QMAT_OPTION_DOC_SIZE,
                                  "Save the result; may be repeated. A folder for several models, - for the standard "
                                  "output. The ending chooses the format:");
   const char *comma = "";
+  bool in_both = true; /* the outputs of both graphs come first */
   for (size_t i = 0; i < graph->output_count; i++) {
     const qmat_param *format = qmat_output_format_param(graph->nodes[graph->outputs[i].node].type);
+    if (in_both && !has_output(colliders, graph->outputs[i].name)) {
+      comma = "; without --colliders also";
+      in_both = false;
+    }
     for (int k = 0; format && format->choices[k] && used < QMAT_OPTION_DOC_SIZE; k++, comma = ",")
       used += (size_t)snprintf(doc + used, QMAT_OPTION_DOC_SIZE - used, "%s .%s", comma, format->choices[k]);
   }
@@ -81,7 +93,7 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
   qmat_status status = QMAT_OK;
   for (int i = 0; i < 2 && status == QMAT_OK; i++)
     status = qmat_graph_read_built_in(context, &invocation->registry, &qmat_built_in_graphs[i], &graphs[i]);
-  if (status == QMAT_OK) status = add_output(context, invocation, &graphs[0]);
+  if (status == QMAT_OK) status = add_output(context, invocation, &graphs[0], &graphs[1]);
   for (int i = 0; i < 2 && status == QMAT_OK; i++)
     status = add_inputs(context, invocation, &graphs[i], &graphs[1 - i], only[i]);
   for (int i = 0; i < 2; i++) qmat_graph_uninit(&graphs[i]);
@@ -91,6 +103,10 @@ static qmat_status add_options(qmat_context *context, qmat_invocation *invocatio
 static bool has_ending(const char *path, const char *ending) {
   const size_t length = strlen(path), size = strlen(ending);
   return length > size && strcasecmp(path + length - size, ending) == 0;
+}
+
+static bool is_view(const char *path) {
+  return has_ending(path, ".html") || has_ending(path, ".htm") || has_ending(path, ".png") || has_ending(path, ".svg");
 }
 
 /* Whether the outputs can hold a medial mesh for each mesh of a scene: glTF, or for a scene of USD a layer over it.
@@ -107,9 +123,20 @@ static bool saves_scene(const qmat_invocation *invocation) {
     const qmat_format format = qmat_format_of_name(strcmp(path, "-") == 0 ? stream : path);
     if (format == QMAT_FORMAT_GLB || format == QMAT_FORMAT_GLTF) return true;
     if (format == QMAT_FORMAT_USD && given == QMAT_FORMAT_USD) return true;
-    only_views = only_views && (has_ending(path, ".html") || has_ending(path, ".png") || has_ending(path, ".svg"));
+    only_views = only_views && is_view(path);
   }
   return only_views;
+}
+
+/* The graph of colliders makes no pages and pictures. */
+static qmat_status check_views(qmat_context *context, const qmat_invocation *invocation) {
+  for (size_t i = 0; qmat_invocation_value(invocation, "colliders") && i < invocation->given_count; i++) {
+    const char *path = invocation->given[i].value;
+    if (strcmp(invocation->given[i].name, "output") != 0 || !is_view(path)) continue;
+    qmat_fail(context, QMAT_ERROR_USAGE, "--colliders makes no pages and pictures, such as '%s'", qmat_show(path).text);
+    return qmat_fail_hint(context, "save it in a run without --colliders");
+  }
+  return QMAT_OK;
 }
 
 /* Reads the graph; refuses options of the other one. */
@@ -194,7 +221,8 @@ static qmat_status run(qmat_context *context, qmat_invocation *invocation) {
     qmat_fail(context, QMAT_ERROR_USAGE, "the output path is missing");
     return qmat_fail_hint(context, "-o PATH");
   }
-  const qmat_status status = read_graph(context, invocation);
+  qmat_status status = read_graph(context, invocation);
+  if (status == QMAT_OK) status = check_views(context, invocation);
   if (status != QMAT_OK) return status;
   const bool pattern = strpbrk(first, "*?[") && is_missing(first);
   if (invocation->argument_count > 1 || is_folder(first) || is_folder(output) || pattern)

@@ -12,7 +12,8 @@ const qmat_command qmat_command_run = {
     .doc =
         "Runs a graph file, one from the standard input (-), or a built-in one ('qmat graphs'). Files are written only "
         "after every node has succeeded. Paths in the graph are relative to "
-        "the graph file; paths given here are relative to the working folder.",
+        "the graph file; paths given here, and those in a graph from the standard input, are relative to the working "
+        "folder.",
     .options = qmat_output_options,
     .common = qmat_common_options,
     .caching = qmat_cache_option_rows,

@@ -165,9 +165,11 @@ qmat_status qmat_read_graph_argument(qmat_context *context, qmat_invocation *inv
   const char *name = invocation->arguments[0], *path = name;
   const qmat_built_in_graph *built_in = qmat_built_in_graph_named(name);
   if (built_in) return qmat_graph_read_built_in(context, &invocation->registry, built_in, &invocation->graph);
-  qmat_status status = strcmp(name, "-") == 0 ? qmat_streams_read(context, &invocation->streams, &path) : QMAT_OK;
+  const char *stream = strcmp(name, "-") == 0 ? QMAT_STREAM_NAME : NULL;
+  qmat_status status = stream ? qmat_streams_read(context, &invocation->streams, &path) : QMAT_OK;
   if (status == QMAT_OK)
-    status = qmat_graph_read_file_all(context, &invocation->registry, path, qmat_print_error, &invocation->graph);
+    status =
+        qmat_graph_read_file_all(context, &invocation->registry, path, stream, qmat_print_error, &invocation->graph);
   if (status != QMAT_OK && access(path, F_OK) != 0) qmat_fail_hint(context, "'qmat graphs' lists the built-in ones");
   return status;
 }

@@ -31,12 +31,14 @@ static step_table lay_out(const qmat_run *run, FILE *out) {
   return table;
 }
 
-/* Prints the columns that identify a step. Returns how many columns they take. */
-static int print_step(const step_table *table, const qmat_run *run, const qmat_run_step *step, bool ran, FILE *out) {
+/* Prints the columns that identify a step. Returns how many columns they take. `is_last`: nothing follows in the row.
+ */
+static int print_step(const step_table *table, const qmat_run *run, const qmat_run_step *step, bool ran, bool is_last,
+                      FILE *out) {
   const qmat_graph_node *node = &run->graph->nodes[step->node];
   int column = fprintf(out, "%-*s  ", table->id, node->id);
   if (table->type > 0) column += fprintf(out, "%-*s  ", table->type, node->type->name);
-  if (run->cache) column += fprintf(out, "%-10s", qmat_step_state_words(step->state, ran));
+  if (run->cache) column += fprintf(out, "%-*s", is_last ? 0 : 10, qmat_step_state_words(step->state, ran));
   return column;
 }
 
@@ -81,7 +83,7 @@ static void print_table(const qmat_run *run, FILE *out) {
     const qmat_run_step *step = &run->steps[i];
     const qmat_node *type = run->graph->nodes[step->node].type;
     row_end end = {.width = table.width, .first = true};
-    end.column = print_step(&table, run, step, true, out);
+    end.column = print_step(&table, run, step, true, false, out);
     end.column += fprintf(out, " %8.2f s", step->seconds);
     char text[96] = "";
     if (step->lifted_hits > 0) snprintf(text, sizeof text, "%zu of %zu from cache", step->lifted_hits, step->lifted);
@@ -100,8 +102,9 @@ void qmat_print_plan(const qmat_run *run, bool keys, FILE *out) {
     const qmat_run_step *step = &run->steps[i];
     char missing[256], key[65];
     qmat_step_describe_missing(run->graph, step, missing, sizeof missing);
-    int column = print_step(&table, run, step, false, out);
-    if (keys && step->keyed) {
+    const bool has_key = keys && step->keyed;
+    int column = print_step(&table, run, step, false, !has_key && !*missing, out);
+    if (has_key) {
       qmat_digest_hex(&step->key, key);
       column += fprintf(out, "  %.12s", key);
     }

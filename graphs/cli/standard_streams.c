@@ -88,7 +88,7 @@ qmat_status qmat_streams_flush(qmat_context *context, const qmat_streams *stream
 
 void qmat_streams_name(const qmat_streams *streams, qmat_error *error) {
   if (streams->input[0] && strcmp(error->file, streams->input) == 0)
-    snprintf(error->file, sizeof error->file, "standard input");
+    snprintf(error->file, sizeof error->file, QMAT_STREAM_NAME);
 }
 
 void qmat_streams_name_in(const qmat_streams *streams, json_t *report) {

@@ -14,6 +14,9 @@ typedef struct qmat_streams {
   char output[4170]; /* "": nothing goes to the standard output */
 } qmat_streams;
 
+/* What messages call the standard input. */
+#define QMAT_STREAM_NAME "standard input"
+
 /* Whether a path names a standard stream: "-", or "-.ma" for one with a format. */
 bool qmat_is_stream(const char *path);
 

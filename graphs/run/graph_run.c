@@ -107,6 +107,21 @@ static qmat_status execute_steps(qmat_executor *executor) {
   return status;
 }
 
+/* The advice to state the unit of the model's file names the node that reads it, and goes where none does. */
+static void fit_unit_advice(const qmat_run *run, qmat_error *error) {
+  char *advice = strstr(error->hint, QMAT_UNIT_ADVICE);
+  if (!advice) return;
+  for (size_t i = 0; i < run->step_count; i++) {
+    const qmat_graph_node *node = &run->graph->nodes[run->steps[i].node];
+    if (strcmp(node->type->name, "scene.read") != 0) continue;
+    if (strcmp(node->id, "model") != 0)
+      snprintf(advice, sizeof error->hint - (size_t)(advice - error->hint),
+               ", or state the file's unit: --set %s.unit=mm", node->id);
+    return;
+  }
+  *advice = 0;
+}
+
 qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_run_observer *observer) {
   const char *outer_id = context->node_id, *outer_type = context->node_type;
   qmat_executor executor = {.context = context, .run = run, .observer = observer};
@@ -118,6 +133,7 @@ qmat_status qmat_run_execute(qmat_context *context, qmat_run *run, const qmat_ru
     run->bypass = true;
     status = execute_steps(&executor);
   }
+  if (status != QMAT_OK) fit_unit_advice(run, &context->error);
   context->node_id = outer_id;
   context->node_type = outer_type;
   run->seconds = qmat_clock_seconds() - start;

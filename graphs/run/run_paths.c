@@ -43,7 +43,7 @@ bool qmat_same_file(const char *a, const char *b) {
 }
 
 qmat_status qmat_run_check_not_input(qmat_context *context, const qmat_run *run, const char *what, const char *path) {
-  if (qmat_same_file(path, run->graph->file))
+  if (run->graph->is_file && qmat_same_file(path, run->graph->file))
     return qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite the graph file", what, path);
   for (size_t i = 0; i < run->step_count; i++) {
     const qmat_graph_node *node = &run->graph->nodes[run->steps[i].node];

@@ -117,6 +117,15 @@ static bool was_told(const qmat_run *run, size_t step, size_t mesh, const char *
   return false;
 }
 
+/* A warning of a node. What it advises to set is its own, by the node's name in the built-in graph: it gets that of the
+ * graph. */
+static json_t *warning_json(const char *id, const char *text) {
+  const char *option = strstr(text, "--set "), *name = option ? option + strlen("--set ") : "";
+  const char *dot = name + strspn(name, "abcdefghijklmnopqrstuvwxyz_");
+  if (*dot != '.') return json_sprintf("node '%s': %s", id, text);
+  return json_sprintf("node '%s': %.*s%s%s", id, (int)(name - text), text, id, dot);
+}
+
 json_t *qmat_run_warnings(const qmat_run *run, bool only_failures) {
   json_t *all = json_array();
   bool done = all != NULL;
@@ -125,7 +134,7 @@ json_t *qmat_run_warnings(const qmat_run *run, bool only_failures) {
     const json_t *own = json_object_get(run->steps[i].report, "warnings");
     for (size_t k = 0; k < json_array_size(own) && !only_failures; k++) {
       const char *text = json_string_value(json_array_get(own, k));
-      if (text) done = json_array_append_new(all, json_sprintf("node '%s': %s", id, text)) == 0 && done;
+      if (text) done = json_array_append_new(all, warning_json(id, text)) == 0 && done;
     }
     const json_t *meshes = json_object_get(run->steps[i].report, "meshes");
     for (size_t k = 0; k < json_array_size(meshes); k++) {

@@ -285,6 +285,28 @@ bool qmat_gltf_drop_children(json_t *root, json_t *node, size_t given,
   return any;
 }
 
+bool qmat_gltf_is_key(const char *key) {
+  static const char *const keys[] = {
+      "certified",         "data",          "data_format", "edges",        "epsilon",
+      "error_in",          "error_out",     "error_unit",  "flat",         "flat_format",
+      "flat_quantisation", "frame",         "merged",      "origin_x",     "origin_y",
+      "origin_z",          "position_bits", "prim",        "quantisation", "quantisation_unit",
+      "radius_bits",       "skinned",       "triangles",   "version",      "vertices"};
+  if (strncmp(key, "qmat_", 5) != 0) return false;
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+    if (strcmp(&key[5], keys[i]) == 0) return true;
+  return false;
+}
+
+void qmat_gltf_drop_keys(json_t *extras) {
+  const char *key;
+  json_t *value;
+  void *next;
+  json_object_foreach_safe(extras, next, key, value) {
+    if (qmat_gltf_is_key(key)) json_object_del(extras, key);
+  }
+}
+
 bool qmat_gltf_is_skin(const json_t *root, size_t mesh) {
   const json_t *object = json_array_get(json_object_get(root, "meshes"), mesh);
   return json_is_true(json_object_get(json_object_get(object, "extras"), QMAT_GLTF_SKIN_MARK));
@@ -299,7 +321,7 @@ bool qmat_gltf_is_addition(const json_t *root, const json_t *node) {
   if (mesh >= 0) return qmat_gltf_is_skin(root, (size_t)mesh);
   if (!json_object_get(extras, "qmat_data") || json_object_get(node, "children")) return false;
   json_object_foreach((json_t *)(uintptr_t)extras, key, value) {
-    if (strncmp(key, "qmat_", 5) != 0) return false;
+    if (!qmat_gltf_is_key(key)) return false;
   }
   return true;
 }

@@ -28,6 +28,9 @@ enum {
 /* The same where the motion of the body is ours, too. */
 #define QMAT_GLTF_MOTION_MARK "qmat_motion"
 
+/* The extras of a node with the medial mesh of all meshes of an asset together have this. */
+#define QMAT_GLTF_MERGED_MARK "qmat_merged"
+
 /* The JSON and chunks of a .glb or .gltf. Only the container is checked. A zeroed one is empty and valid. */
 typedef struct qmat_gltf_asset {
   bool binary;
@@ -83,6 +86,13 @@ size_t qmat_gltf_parent_of(const json_t *root, size_t node);
  * numbers. */
 bool qmat_gltf_drop_children(json_t *root, json_t *node, size_t given,
                              bool (*is_dropped)(const json_t *root, const json_t *child));
+
+/* Whether qmat writes a member of that name into the extras of nodes with medial meshes. Others with its prefix are a
+ * user's own. */
+bool qmat_gltf_is_key(const char *key);
+
+/* Removes the members that qmat wrote from the extras of a node; NULL is allowed. */
+void qmat_gltf_drop_keys(json_t *extras);
 
 /* Whether a mesh is a skin that qmat added to the asset. */
 bool qmat_gltf_is_skin(const json_t *root, size_t mesh);

@@ -23,6 +23,7 @@ typedef enum obstacle {
   OBSTACLE_SHARED,
   OBSTACLE_SPARSE,
   OBSTACLE_OUTSIDE,
+  OBSTACLE_QUANTISED,
   OBSTACLE_DATA,
   OBSTACLE_REFUSED,
   OBSTACLE_COUNT
@@ -35,6 +36,7 @@ static const char *const obstacle_texts[OBSTACLE_COUNT] = {
     [OBSTACLE_SHARED] = "the data are also used by something else",
     [OBSTACLE_SPARSE] = "the data are sparse",
     [OBSTACLE_OUTSIDE] = "the data are outside the binary chunk",
+    [OBSTACLE_QUANTISED] = "positions or normals are already quantised (KHR_mesh_quantization)",
     [OBSTACLE_DATA] = "the data are invalid or unsupported",
     [OBSTACLE_REFUSED] = "Draco cannot encode the data",
 };
@@ -247,7 +249,11 @@ static qmat_status take_attribute(compressor *c, packing *p, const char *name, c
   if (p->attribute_count == MOST_ATTRIBUTES || !view_accessor(c, index, &view) || !draco_number_of(view.type, &number))
     return QMAT_OK;
   const bool is_position = strcmp(name, "POSITION") == 0, is_normal = strcmp(name, "NORMAL") == 0;
-  if ((is_position || is_normal) && (view.components != 3 || number != QMAT_DRACO_FLOAT)) return QMAT_OK;
+  if ((is_position || is_normal) && view.components != 3) return QMAT_OK;
+  if ((is_position || is_normal) && number != QMAT_DRACO_FLOAT) {
+    if (*why == OBSTACLE_DATA) *why = OBSTACLE_QUANTISED;
+    return QMAT_OK;
+  }
   if (p->attribute_count > 0 && view.count != p->vertex_count) return QMAT_OK;
   *why = OBSTACLE_SHARED;
   if (c->shared[index]) return QMAT_OK;

@@ -131,14 +131,51 @@ static void take_children(earlier *e, json_t *node, bool is_carrier) {
   if (children && json_array_size(children) == 0) json_object_del(node, "children");
 }
 
+/* Removes a number from the array `key` of each member of a list. */
+static void remove_number(json_t *list, const char *key, size_t number) {
+  for (size_t i = 0; i < json_array_size(list); i++) {
+    json_t *member = json_array_get(list, i), *numbers = json_object_get(member, key);
+    for (size_t k = json_array_size(numbers); k-- > 0;)
+      if (json_number_value(json_array_get(numbers, k)) == (double)number) json_array_remove(numbers, k);
+  }
+}
+
+/* Takes a node with the medial mesh of all meshes out of the scenes. It stays without it where it has other members. */
+static void take_merged(earlier *e, size_t id) {
+  json_t *node = json_array_get(json_object_get(e->root, "nodes"), id), *extras = json_object_get(node, "extras");
+  const int64_t mesh = qmat_gltf_mesh_of(node);
+  take_children(e, node, true);
+  qmat_gltf_drop_keys(extras);
+  if (json_object_get(node, "children") || json_object_size(extras) > 0) {
+    if (mesh >= 0 && qmat_gltf_is_skin(e->root, (size_t)mesh)) json_object_del(node, "mesh");
+    return;
+  }
+  e->ours[NODES][id] = true;
+  remove_number(json_object_get(e->root, "scenes"), "nodes", id);
+  remove_number(json_object_get(e->root, "nodes"), "children", id);
+}
+
+/* Removes the members of a medial mesh from a node. */
+static void drop_members(json_t *node) {
+  json_t *extras = json_object_get(node, "extras");
+  const bool had = json_object_size(extras) > 0;
+  qmat_gltf_drop_keys(extras);
+  if (had && json_object_size(extras) == 0) json_object_del(node, "extras");
+}
+
 /* Finds the nodes to take out, and empties them. */
 static bool take_nodes(earlier *e, const bool *is_replaced) {
   const json_t *nodes = json_object_get(e->root, "nodes");
   for (size_t i = 0; i < e->counts[NODES]; i++) {
     json_t *node = json_array_get(nodes, i);
     const int64_t mesh = qmat_gltf_mesh_of(node);
-    if (mesh < 0 || (uint64_t)mesh >= e->counts[MESHES] || !is_replaced[mesh]) continue;
+    if (json_object_get(json_object_get(node, "extras"), QMAT_GLTF_MERGED_MARK)) {
+      take_merged(e, i);
+      continue;
+    }
+    if (mesh < 0 || (uint64_t)mesh >= e->counts[MESHES] || (is_replaced && !is_replaced[mesh])) continue;
     take_children(e, node, true);
+    if (!is_replaced) drop_members(node);
     const json_t *number = json_object_get(node, "skin");
     const json_t *skin = json_array_get(json_object_get(e->root, "skins"), (size_t)json_number_value(number));
     const json_t *joints = number ? json_object_get(skin, "joints") : NULL;

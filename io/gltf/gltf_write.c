@@ -84,16 +84,6 @@ static bool add_child(json_t *root, json_t *node, json_t *child, const double *o
   return done && qmat_gltf_add(node, "children", json_integer(number), NULL);
 }
 
-/* Removes the keys of an earlier run from a node's extras. */
-static void remove_extras(json_t *own) {
-  const char *key;
-  json_t *value;
-  void *next;
-  json_object_foreach_safe(own, next, key, value) {
-    if (strncmp(key, "qmat_", 5) == 0) json_object_del(own, key);
-  }
-}
-
 static const double in_place[3] = {0, 0, 0}; /* where joints take the points of a mesh from */
 
 /* Adds a medial mesh and its skin to every node that references the mesh. The skin is always on a child. The medial
@@ -107,7 +97,7 @@ static bool add_to_carriers(document *document, json_int_t mesh, const json_t *e
   for (size_t i = 0; i < count && done; i++) {
     json_t *node = json_array_get(nodes, i), *own = json_object_get(node, "extras");
     if (qmat_gltf_mesh_of(node) != mesh) continue;
-    remove_extras(own);
+    qmat_gltf_drop_keys(own);
     qmat_gltf_drop_children(document->root, node, document->nodes_given, qmat_gltf_is_addition);
     if (!is_zero(origin) || (own && !json_is_object(own))) {
       done = add_child(document->root, node, json_pack("{s:O}", "extras", extras), origin, "medial mesh");
@@ -159,6 +149,7 @@ static bool add_node(document *document, const json_t *extras, const double *ori
   if (name) done = done && qmat_gltf_set(node, "name", json_string(name));
   if (skin >= 0) done = done && qmat_gltf_set(node, "mesh", json_integer(skin));
   done = done && set_extras(node, extras);
+  if (!is_new) done = done && qmat_gltf_set(json_object_get(node, "extras"), QMAT_GLTF_MERGED_MARK, json_true());
   json_int_t number;
   if (!qmat_gltf_add(document->root, "nodes", node, &number) || !done) return false;
   return is_new ? add_converted(document, options, number) : add_root(document->root, number);
@@ -242,14 +233,16 @@ static qmat_status add_skins(qmat_context *context, document *document, size_t m
 
 /* ---- the document ---- */
 
-/* Takes what an earlier run added for the meshes that get medial meshes out of the asset. */
+/* Takes what an earlier run added for the meshes that get medial meshes out of the asset: for all of them where they
+ * share one. */
 static qmat_status drop_earlier(qmat_context *context, const qmat_scene *scene, const qmat_gltf_addition *additions,
                                 document *document) {
   const size_t count = json_array_size(json_object_get(document->root, "meshes"));
   bool *is_replaced = qmat_calloc(count + 1, sizeof *is_replaced);
   for (size_t i = 0; is_replaced && i < scene->mesh_count; i++)
     if (scene->meshes[i] < count) is_replaced[scene->meshes[i]] = additions[i].medial != NULL;
-  const bool done = is_replaced && qmat_gltf_drop_earlier(document->root, is_replaced, &document->asset.chunk_size);
+  const bool *replaced = scene->mesh_count > 0 ? is_replaced : NULL;
+  const bool done = is_replaced && qmat_gltf_drop_earlier(document->root, replaced, &document->asset.chunk_size);
   qmat_free(is_replaced);
   return done ? QMAT_OK : qmat_fail_memory(context, "a glTF file");
 }
@@ -277,7 +270,7 @@ static qmat_status open_document(qmat_context *context, const qmat_scene *scene,
     asset->chunk = document->embedded;
     asset->chunk_size = size;
   }
-  if (status == QMAT_OK && scene->mesh_count > 0) status = drop_earlier(context, scene, additions, document);
+  if (status == QMAT_OK) status = drop_earlier(context, scene, additions, document);
   document->nodes_given = json_array_size(json_object_get(document->root, "nodes"));
   document->meshes_given = json_array_size(json_object_get(document->root, "meshes"));
   const json_t *buffers = json_object_get(document->root, "buffers");

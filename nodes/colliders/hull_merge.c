@@ -21,6 +21,11 @@ static const double fine_share = 0.1;
 /* In diagonals: what rounding may do to the points of parts. */
 static const double least_margin = 2e-7;
 
+/* Vertices of a hull at the end are farther apart than this, in diagonals: single precision has to tell them apart,
+ * also some diagonals from the origin, and edges to be long enough for normals. For small errors it is a share of
+ * these. */
+static const double least_edge = 1e-5, edge_share = 0.05;
+
 /* Pairs are compared by a coarse search; the one that is joined is searched to the end. */
 enum { FEW_HALVINGS = 3, MANY_HALVINGS = 48 };
 
@@ -49,6 +54,7 @@ typedef struct joint {
   size_t point_count, triangle_count;
   double *points, *unit; /* in the model, and in the unit frame */
   uint32_t *triangles;
+  uint8_t *is_vertex; /* per point */
   qmat_tangent_hull fine, coarse;
   qmat_outer_hull outer;
 } joint;
@@ -68,7 +74,6 @@ typedef struct merging {
   pair *pairs;
   size_t pair_count, pair_capacity;
   joint *joints;       /* one per thread */
-  uint8_t *is_vertex;  /* scratch: of a joint hull's points */
   _Atomic size_t done; /* hulls of those that are made side by side */
 } merging;
 
@@ -208,7 +213,7 @@ static qmat_status join_pair(merging *m, uint32_t a, uint32_t b) {
   const qmat_status joined = join(m, into, from, j);
   if (joined != QMAT_OK) return fail(m, joined);
   const double volume = qmat_hull_volume(j->points, j->triangles, j->triangle_count);
-  size_t used = qmat_hull_vertices_keep(j->points, j->point_count, j->triangles, j->triangle_count, m->is_vertex);
+  size_t used = qmat_hull_vertices_keep(j->points, j->point_count, j->triangles, j->triangle_count, j->is_vertex);
   const double *vertices = j->points;
   if (used > m->room) {
     const qmat_status status = qmat_tangent_hull_fit_points(&j->fine, j->points, used, 0, fine_share * m->error);
@@ -335,15 +340,15 @@ static qmat_status init(merging *m, qmat_solid_part *given, size_t count, size_t
   m->parts = qmat_arena_calloc(arena, count, sizeof *m->parts);
   m->following = qmat_arena_alloc(arena, count, sizeof *m->following);
   m->joints = qmat_arena_alloc(arena, (size_t)threads, sizeof *m->joints);
-  m->is_vertex = qmat_arena_alloc(arena, 2 * m->room, sizeof *m->is_vertex);
-  if (!m->parts || !m->following || !m->joints || !m->is_vertex) return qmat_fail_memory(m->context, "the hulls");
+  if (!m->parts || !m->following || !m->joints) return qmat_fail_memory(m->context, "the hulls");
   qmat_status status = QMAT_OK;
   for (int i = 0; i < threads && status == QMAT_OK; i++) {
     joint *j = &m->joints[i];
     j->points = qmat_arena_alloc(arena, 2 * m->room, 3 * sizeof *j->points);
     j->unit = qmat_arena_alloc(arena, 2 * m->room, 3 * sizeof *j->unit);
     j->triangles = qmat_arena_alloc(arena, 2 * m->room, 6 * sizeof *j->triangles);
-    if (!j->points || !j->unit || !j->triangles) return qmat_fail_memory(m->context, "the hulls");
+    j->is_vertex = qmat_arena_alloc(arena, 2 * m->room, sizeof *j->is_vertex);
+    if (!j->points || !j->unit || !j->triangles || !j->is_vertex) return qmat_fail_memory(m->context, "the hulls");
     status = qmat_tangent_hull_init(m->context, m->room, &j->fine);
     if (status == QMAT_OK) status = qmat_tangent_hull_init(m->context, most_points, &j->coarse);
   }
@@ -390,12 +395,32 @@ static qmat_status collect_points(const merging *m, const qmat_hull_pieces *piec
   return status == QMAT_ERROR_GEOMETRY ? QMAT_OK : status;
 }
 
+/* How far apart the vertices of hulls at the end are at least. */
+static double least_gap(const merging *m) {
+  return fmin(least_edge * qmat_surface_frame(m->solid)->diagonal, edge_share * m->error);
+}
+
+/* Sets the vertices of a hull. Of those too near to each other one stays, unless the rest has no volume. */
+static qmat_status set_vertices(const merging *m, part *p, double *points, size_t count, joint *j) {
+  if (!set_points(p, points, count)) return QMAT_ERROR_MEMORY;
+  size_t apart = qmat_hull_vertices_apart(points, count, least_gap(m)), triangles;
+  if (apart == count) return QMAT_OK;
+  const qmat_status status = qmat_convex_hull(points, apart, j->triangles, &triangles);
+  if (status == QMAT_ERROR_GEOMETRY) return QMAT_OK;
+  if (status != QMAT_OK) return status;
+  memcpy(p->points, points, 3 * apart * sizeof *points);
+  p->count = qmat_hull_vertices_keep(p->points, apart, j->triangles, triangles, j->is_vertex);
+  qmat_hull_box(p->points, p->count, p->low, p->high);
+  return QMAT_OK;
+}
+
 /* Makes of points a hull with as few vertices as it may have: triangles or half-spaces, whichever has the smaller
- * volume. */
-static qmat_status reduce_points(const merging *m, part *p, joint *j) {
+ * volume. It contains all within `gap` of them: as much as it may lose where vertices are too near to each other. With
+ * 0 they may not be: `*again` tells where they are, and the points stay. */
+static qmat_status reduce_points(const merging *m, part *p, double gap, joint *j, bool *again) {
   const qmat_tangent_hull *coarse = &j->coarse;
   const qmat_outer_hull *outer = &j->outer;
-  const double margin = margin_of(m);
+  const double margin = margin_of(m) + gap;
   double of_outer = INFINITY;
   size_t triangles;
   qmat_status status = surround(&j->coarse, p->points, p->count, margin, m->error);
@@ -407,9 +432,10 @@ static qmat_status reduce_points(const merging *m, part *p, joint *j) {
   if (status == QMAT_OK) of_outer = qmat_hull_volume(outer->points, j->triangles, triangles);
   if (status != QMAT_OK && status != QMAT_ERROR_GEOMETRY) return status;
   const bool is_outer = of_outer < of_coarse;
-  return set_points(p, is_outer ? outer->points : coarse->points, is_outer ? outer->point_count : coarse->point_count)
-             ? QMAT_OK
-             : QMAT_ERROR_MEMORY;
+  double *vertices = is_outer ? outer->points : coarse->points;
+  const size_t count = is_outer ? outer->point_count : coarse->point_count;
+  *again = gap == 0 && qmat_hull_vertices_apart(vertices, count, least_gap(m)) < count;
+  return *again ? QMAT_OK : set_vertices(m, p, vertices, count, j);
 }
 
 static qmat_status collect_points_of(void *data, qmat_context *context, size_t i) {
@@ -422,7 +448,10 @@ static qmat_status collect_points_of(void *data, qmat_context *context, size_t i
 
 static qmat_status reduce_points_of(void *data, qmat_context *context, size_t i) {
   merging *m = data;
-  const qmat_status status = reduce_points(m, &m->ends[i], joint_of_thread(m, context));
+  joint *j = joint_of_thread(m, context);
+  bool again;
+  qmat_status status = reduce_points(m, &m->ends[i], 0, j, &again);
+  if (status == QMAT_OK && again) status = reduce_points(m, &m->ends[i], least_gap(m), j, &again);
   m->done++;
   return record(context, status);
 }

@@ -17,6 +17,16 @@ size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *tri
   return kept;
 }
 
+size_t qmat_hull_vertices_apart(double *points, size_t count, double distance) {
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++) {
+    size_t near = 0;
+    while (near < kept && qmat_point_distance(&points[3 * near], &points[3 * i]) > distance) near++;
+    if (near == kept) memmove(&points[3 * kept++], &points[3 * i], 3 * sizeof *points);
+  }
+  return kept;
+}
+
 void qmat_hull_box(const double *points, size_t count, double low[3], double high[3]) {
   for (int k = 0; k < 3; k++) {
     low[k] = INFINITY;

@@ -11,6 +11,10 @@
 size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *triangles, size_t triangle_count,
                                uint8_t *is_vertex);
 
+/* Keeps those of `count` points (3 doubles each) that are farther than `distance` from every earlier one that is kept,
+ * in their order. Returns their number. The hull loses no more than `distance` of any direction. Quadratic. */
+size_t qmat_hull_vertices_apart(double *points, size_t count, double distance);
+
 /* The box of points (3 doubles each), which is that of their hull; from infinity to -infinity for none. */
 void qmat_hull_box(const double *points, size_t count, double low[3], double high[3]);
 

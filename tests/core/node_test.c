@@ -323,12 +323,12 @@ static void test_a_length_with_a_unit_is_a_share_of_the_diagonal_when_the_node_r
     assert_int_equal(checked, 1); /* once, on shares */
   }
   assert_int_equal(run_with(&context, "13mm", 0), QMAT_ERROR_USAGE);
-  assert_string_equal(context.error.message, "epsilon is 0.013m, but the model has no unit of length");
+  assert_string_equal(context.error.message, "epsilon is 13mm, but the model has no unit of length");
   assert_string_equal(context.error.field, "epsilon");
   assert_non_null(strstr(context.error.hint, "--set model.unit=mm"));
   assert_int_equal(run_with(&context, "26mm", 0.001), QMAT_ERROR_USAGE);
   assert_string_equal(context.error.message,
-                      "epsilon must be between 0 and 1 (diagonal), not 0.026m of a diagonal of 13 mm");
+                      "epsilon must be between 0 and 1 (diagonal), not 26mm of a diagonal of 13 mm");
 }
 
 /* Keys of the cache are made of the canonical text. */

@@ -102,6 +102,8 @@ static void test_a_mesh_in_memory_becomes_spheres_inside_it(void **state) {
   assert_int_equal(mesh.vertex_count, VERTICES);
   assert_int_equal(mesh.triangle_count, TRIANGLES);
   qmat_medial_view medial;
+  assert_int_equal(qmat_job_mesh(job, "simple.medial", &mesh), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "'simple.medial' is a medial mesh, not a mesh"));
   ok(job, qmat_job_medial(job, "simple.medial", &medial));
   assert_true(medial.sphere_count >= 1 && medial.sphere_count < VERTICES);
   double tolerance = 0.03 * 4 * sqrt(3), largest = 0;
@@ -440,6 +442,18 @@ static void test_a_null_that_a_call_cannot_work_with_is_a_usage_error(void **sta
   qmat_job_free(job);
 }
 
+/* A mesh from memory has no file whose unit could be stated. */
+static void test_no_hint_advises_what_a_mesh_from_memory_does_not_have(void **state) {
+  (void)state;
+  qmat_job *job = job_with_ball();
+  ok(job, qmat_job_want(job, "simple.medial"));
+  ok(job, qmat_job_set(job, "epsilon=5mm"));
+  assert_int_equal(qmat_job_run(job, 0, NULL, NULL), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "epsilon is 5mm, but the model has no unit of length"));
+  assert_string_equal(qmat_job_error(job)->hint, "type a share of the diagonal, such as 1%");
+  qmat_job_free(job);
+}
+
 static void test_mistakes_are_results_with_a_problem(void **state) {
   (void)state;
   qmat_job *job;
@@ -590,6 +604,7 @@ int main(void) {
       cmocka_unit_test(test_items_of_a_list_are_read_one_by_one_and_one_that_failed_says_why),
       cmocka_unit_test(test_the_cache_folder_follows_the_environment),
       cmocka_unit_test(test_a_null_that_a_call_cannot_work_with_is_a_usage_error),
+      cmocka_unit_test(test_no_hint_advises_what_a_mesh_from_memory_does_not_have),
       cmocka_unit_test(test_mistakes_are_results_with_a_problem),
       cmocka_unit_test(test_a_bad_graph_keeps_its_error),
       cmocka_unit_test(test_a_job_takes_from_the_cache_what_another_has_made),

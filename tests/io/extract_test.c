@@ -189,8 +189,31 @@ static void test_of_several_one_has_to_be_named(void **state) {
   qmat_value_release(&other->base);
   assert_fails(root, NULL, QMAT_ERROR_USAGE, "2 nodes have a medial mesh; choose one");
   assert_fails(root, "third", QMAT_ERROR_GEOMETRY, "no node of this name has a medial mesh");
+  assert_fails(root, "7", QMAT_ERROR_GEOMETRY, "node 7 has no medial mesh");
+  assert_int_equal(extract_json(&context, root, "7", &read, NULL), QMAT_ERROR_GEOMETRY);
+  assert_string_equal(context.error.hint, "these have one: first, second");
   assert_int_equal(extract_json(&context, root, "second", &read, NULL), QMAT_OK);
   qmat_value_release(&read->base);
+  json_decref(root);
+  qmat_value_release(&medial->base);
+  qmat_context_uninit(&context);
+}
+
+/* Far from zero the medial mesh is on a child of the node with the mesh. */
+static void test_the_node_with_the_mesh_stands_for_its_child(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  qmat_medial *medial = example_medial(20), *read;
+  json_t *root = write_gltf(medial), *nodes = json_object_get(root, "nodes");
+  json_array_append_new(nodes, json_pack("{s:s, s:i, s:[i]}", "name", "body", "mesh", 0, "children", 0));
+  json_array_append_new(nodes, json_pack("{s:s, s:[i]}", "name", "group", "children", 1));
+  static const char *const called[] = {"first", "0", "body", "1"};
+  for (size_t i = 0; i < 4; i++) {
+    assert_int_equal(extract_json(&context, root, called[i], &read, NULL), QMAT_OK);
+    assert_int_equal(read->sphere_count, medial->sphere_count);
+    qmat_value_release(&read->base);
+  }
+  assert_fails(root, "group", QMAT_ERROR_GEOMETRY, "no node of this name has a medial mesh");
   json_decref(root);
   qmat_value_release(&medial->base);
   qmat_context_uninit(&context);
@@ -299,6 +322,7 @@ int main(void) {
       cmocka_unit_test(test_what_was_written_comes_back_with_its_facts),
       cmocka_unit_test(test_every_form_gives_back_what_was_written_within_what_it_states),
       cmocka_unit_test(test_of_several_one_has_to_be_named),
+      cmocka_unit_test(test_the_node_with_the_mesh_stands_for_its_child),
       cmocka_unit_test(test_the_plain_form_is_read_alone_and_compared_beside_draco),
       cmocka_unit_test(test_carriers_are_told_apart_by_what_names_them),
       cmocka_unit_test(test_broken_data_and_wrong_counts_are_errors),

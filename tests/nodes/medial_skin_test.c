@@ -372,7 +372,19 @@ static void test_a_gap_narrower_than_all_cells_is_filled_and_stated(void **unuse
   assert_true(found > 2e-3 && number_of(result, "envelope_to_mesh") >= found);
   assert_true(number_of(result, "mesh_to_envelope") <= 2e-3);
   assert_true((double)result.mesh->triangle_count < 0.1 * number_of(result, "contour_triangles"));
+  const char *const settings[] = {"resolution=128 detail=3 error=0.2%", "resolution=16 detail=5 error=0.2%",
+                                  "resolution=16 detail=6 error=0.2%"};
+  const char *const advice[] = {"--set skin.detail=5", "--set skin.detail=6", NULL}; /* 6 is the most */
   assert_int_equal(json_array_size(json_object_get(result.report->root, "warnings")), 1);
+  for (size_t i = 0; i < 3; i++) {
+    skin_result other = skin(medial_mesh(spheres, 4, edges, 2, NULL, 0), settings[i]);
+    const json_t *warnings = json_object_get(other.report->root, "warnings");
+    assert_int_equal(json_array_size(warnings), 1);
+    const char *option = strstr(json_string_value(json_array_get(warnings, 0)), "--set");
+    if (advice[i]) assert_string_equal(option, advice[i]);
+    if (!advice[i]) assert_null(option);
+    release(other);
+  }
   release(result);
   qmat_value_release(&medial->base);
   qmat_context_uninit(&context);

@@ -558,6 +558,7 @@ static void test_hulls_have_the_name_of_their_mesh_and_instances_share_a_body(vo
   assert_int_equal(shown_as(root, "Crate_01-convcolonly"), 1);
   const json_t *warnings = json_object_get(report->root, "warnings");
   assert_int_equal(json_array_size(warnings), 1);
+  assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), ": 1 node with instances has one body"));
   assert_non_null(strstr(json_string_value(json_array_get(warnings, 0)), "EXT_mesh_gpu_instancing"));
   json_decref(root);
   qmat_value_release(&file->base);
@@ -569,6 +570,54 @@ static void test_hulls_have_the_name_of_their_mesh_and_instances_share_a_body(vo
   qmat_value_release(&c->base);
   qmat_value_release(&medial->base);
   qmat_value_release(&scene->base);
+  qmat_writer_uninit(&glb);
+  qmat_writer_uninit(&data);
+}
+
+/* Writes with one setting, and returns the only warning, or "" for none; valid until the next call. */
+static const char *warning_of(const qmat_medial *medial, wiring from, const char *name, const char *value) {
+  static char text[400];
+  qmat_report *report;
+  qmat_file *file =
+      must_write_with_report(medial, from, (const char *const[][2]){{name, value}, {NULL, NULL}}, &report);
+  const json_t *warnings = json_object_get(report->root, "warnings");
+  assert_true(json_array_size(warnings) <= 1);
+  const char *warning = json_string_value(json_array_get(warnings, 0));
+  snprintf(text, sizeof text, "%s", warning ? warning : "");
+  qmat_value_release(&file->base);
+  qmat_value_release(&report->base);
+  return text;
+}
+
+static void test_bodies_that_nothing_follows_and_idle_settings_are_told(void **state) {
+  (void)state;
+  static const char asset[] =
+      "{'asset':{'version':'2.0'},'scenes':[{'nodes':[0]}],'nodes':[{'mesh':0}],"
+      "'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}],"
+      "'accessors':[{'bufferView':0,'componentType':5126,'count':8,'type':'VEC3','min':[0,0,0],'max':[1,1,1]}],"
+      "'bufferViews':[{'buffer':0,'byteLength':96}],'buffers':[{'byteLength':96}]}";
+  qmat_writer data = {0};
+  put_box_corners(&data, 1);
+  qmat_writer glb = asset_glb(asset, data.bytes, data.size);
+  qmat_scene *each = make_gltf_scene("box", &glb), *merged = make_gltf_scene("box", &glb);
+  merged->mesh_count = 0; /* one medial mesh for all of the scene */
+  qmat_medial *medial = make_medial();
+  qmat_colliders *c = make_colliders();
+  assert_string_equal(warning_of(medial, (wiring){.scene = each, .colliders = c}, "khr_physics", "true"), "");
+  assert_non_null(strstr(warning_of(medial, (wiring){.scene = merged, .colliders = c}, "khr_physics", "true"),
+                         "the body of all meshes together moves alone"));
+  assert_string_equal(warning_of(medial, (wiring){.scene = merged, .colliders = c}, "fixed", "true"), "");
+  static const char *const idle[] = {"khr_physics", "omi_physics", "unreal_hulls", "godot_hulls", "fixed"};
+  for (size_t i = 0; i < sizeof idle / sizeof *idle; i++) {
+    const char *warning = warning_of(medial, (wiring){.scene = each}, idle[i], "true");
+    assert_memory_equal(warning, idle[i], strlen(idle[i]));
+    assert_non_null(strstr(warning, " has no effect without colliders"));
+  }
+  qmat_value_release(&c->base);
+  qmat_value_release(&medial->base);
+  merged->mesh_count = 1;
+  qmat_value_release(&merged->base);
+  qmat_value_release(&each->base);
   qmat_writer_uninit(&glb);
   qmat_writer_uninit(&data);
 }
@@ -715,6 +764,7 @@ int main(void) {
       cmocka_unit_test(test_files_for_robots_are_in_metres),
       cmocka_unit_test(test_each_form_of_colliders_is_written_where_it_is_chosen),
       cmocka_unit_test(test_bodies_that_are_fixed_have_colliders_and_no_mass),
+      cmocka_unit_test(test_bodies_that_nothing_follows_and_idle_settings_are_told),
       cmocka_unit_test(test_hulls_have_the_name_of_their_mesh_and_instances_share_a_body),
       cmocka_unit_test(test_triangles_of_a_scene_are_compressed_where_that_is_chosen),
       cmocka_unit_test(test_compression_does_not_apply_to_formats_that_have_none),

@@ -90,6 +90,11 @@ for cached in --no-cache --cache=planned; do
 done
 expect 0 "model (scene.read): cannot run: model: not given (--set model=FILE)" \
   "$qmat" why "$source/graphs/qmat_plus.yaml" simple --cache planned
+"$qmat" mat box.off -o a.glb --dry-run --cache planned >out.txt
+holds "no blanks at the ends of a plan" sh -c 'grep -q "to run$" out.txt && ! grep -q " $" out.txt'
+expect 2 "--colliders makes no pages and pictures, such as 'a.html'" "$qmat" mat box.off --colliders -o a.html
+"$qmat" help mat >out.txt
+holds "what colliders are not saved as" sh -c 'tr -s " \n" " " <out.txt | grep -q ".yaml; without --colliders also .html"'
 printf 'qmat: 1\nnodes: { m: { type: scene.read } }\noutputs: { mesh: m.mesh }\n' >no_input.yaml
 expect 0 "path: not given (--set m.path=FILE)" "$qmat" run no_input.yaml --dry-run
 expect 2 "path must be given (--set m.path=FILE)" "$qmat" check no_input.yaml

@@ -57,6 +57,35 @@ hint 1 'too many for a skin surface' box.off -o x.glb --epsilon 2% --set skin.me
   --set skin.spacing=0.02
 hint 1 'not certified' box.off -o x.ma --require certified --set errors.epsilon=0.0001%
 
+# Hints and warnings have the names of the graph.
+{
+  echo 'OFF 16 11 0'
+  for x in 0 5; do
+    for z in 0 1; do printf '%s 0 %s\n%s 0 %s\n%s 1 %s\n%s 1 %s\n' $x $z $((x + 1)) $z $((x + 1)) $z $x $z; done
+  done
+  for i in 0 8; do
+    for face in '3 2 1 0' '0 1 5 4' '1 2 6 5' '2 3 7 6' '3 0 4 7' '4 5 6 7'; do
+      if [ "$i$face" = '04 5 6 7' ]; then continue; fi
+      set -- $face
+      echo 4 $(($1 + i)) $(($2 + i)) $(($3 + i)) $(($4 + i))
+    done
+  done
+} >open.off
+cat >names.yaml <<'END'
+qmat: 1
+nodes:
+  file: { type: scene.read, params: { path: open.off } }
+  body: { type: mesh.solid, in: { mesh: file.mesh } }
+  field: { type: mesh.sdf, in: { mesh: body.mesh } }
+  points: { type: mesh.sample, in: { mesh: body.mesh, thickness: field.thickness } }
+outputs: { samples: points.samples }
+END
+expect 0 "node 'body': the openings of 1 component are closed" "$qmat" run names.yaml
+holds 'the warning has the name of the node' grep -q -e '--set body.solid=sheet keeps' err.txt
+expect 0 '' "$qmat" run names.yaml --set body.solid=sheet
+expect 2 "spacing is 0.5mm, but the model has no unit of length" "$qmat" run names.yaml --set points.spacing=0.5mm
+holds 'the hint has the name of the node' grep -q -e "state the file's unit: --set file.unit=mm)" err.txt
+
 # A name that two meshes have, and one that none has, in glTF.
 holds 'a scene' "$qmat" mat --quiet --progress off two.usda -o two.glb --epsilon 10%
 hint 2 "no node references a mesh named or numbered 'none'" two.glb -o x.glb --set model.mesh=none

@@ -27,6 +27,20 @@ holds "a graph from the standard input" cmp right.ma out.ma
 expect 2 "only one file can go to" "$qmat" mat box.off -o - -o -.ma $coarse
 echo "OFF 1 2" | expect 1 "qmat: standard input:1:6: " "$qmat" mat - -o out.ma
 printf 'qmat: 1\nnodes:\n  a: { type: mesh.sfd }\n' | expect 2 "standard input:3:14: " "$qmat" check -
+cat >piped.yaml <<'END'
+qmat: 1
+nodes:
+  model: { type: scene.read, params: { path: box.off } }
+  solid: { type: mesh.solid, in: { mesh: model.mesh } }
+outputs:
+  report: { from: solid.report, path: made/solid.json }
+END
+expect 0 "made/solid.json" "$qmat" run - <piped.yaml
+holds "paths of a graph from the standard input are relative to the working folder" test -s made/solid.json
+expect 0 "standard input: 2 nodes" "$qmat" check - <piped.yaml
+printf 'qmat: 1\nnodes:\n  a: { type: mesh.sfd }\n  b: { type: mesh.sfd }\n' | expect 2 "standard input:3:14: " "$qmat" check -
+holds "each mistake names the standard input" test "$(grep -c '^qmat: standard input:' err.txt)" -eq 2
+rm -r made
 holds "nothing is left in the temporary folder" test -z "$(ls temporary)"
 "$qmat" info - <box.off >out.txt 2>err.txt
 holds "the standard input by its name" grep -qx "standard input: a surface" out.txt

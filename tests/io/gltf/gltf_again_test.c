@@ -18,11 +18,13 @@
 #include "tests/medial_meshes.h"
 #include "tests/shapes.h"
 
-/* Two meshes of one name, each on a node; the asset has a hull of it and a shape already. */
+/* Two meshes of one name, each on a node, the second one with a member of the user's own; the asset has a hull of it
+ * and a shape already. */
 static const char boxes[] =
     "{'asset':{'version':'2.0'},'scenes':[{'nodes':[0,1,2]}],'extensionsUsed':['KHR_implicit_shapes'],"
     "'extensions':{'KHR_implicit_shapes':{'shapes':[{'type':'sphere','sphere':{'radius':1}}]}},"
-    "'nodes':[{'mesh':0,'name':'a'},{'mesh':1,'name':'b'},{'mesh':2,'name':'UCX_Box_01'}],"
+    "'nodes':[{'mesh':0,'name':'a'},{'mesh':1,'name':'b','extras':{'qmat_note':'mine'}},{'mesh':2,'name':'UCX_Box_01'}]"
+    ","
     "'meshes':[{'name':'Box','primitives':[{'attributes':{'POSITION':0},'indices':1}]},"
     "{'name':'Box','primitives':[{'attributes':{'POSITION':0},'indices':1}]},"
     "{'name':'UCX_Box_01','primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
@@ -39,8 +41,9 @@ static qmat_colliders *make_colliders(void) {
   return hull_colliders(spheres, 3, shapes, 2, body, tetrahedron, 0);
 }
 
-/* Adds medial meshes to both boxes of an asset, with skins, and with colliders of the forms (0: without). */
-static qmat_file *run_on(const uint8_t *bytes, size_t size, unsigned forms, bool has_skin) {
+/* Adds a medial mesh to each of both boxes of an asset, or to both together, with skins, and with colliders of the
+ * forms (0: without). */
+static qmat_file *run_as(const uint8_t *bytes, size_t size, unsigned forms, bool has_skin, bool is_merged) {
   static const uint32_t numbers[] = {0, 1};
   qmat_context context = {0};
   qmat_scene *scene = qmat_scene_new();
@@ -50,9 +53,11 @@ static qmat_file *run_on(const uint8_t *bytes, size_t size, unsigned forms, bool
   scene->part_count = 1;
   scene->parts[0] = (qmat_file_part){.name = qmat_strdup(""), .bytes = qmat_alloc(size, 1), .size = size};
   memcpy(scene->parts[0].bytes, bytes, size);
-  scene->mesh_count = 2;
-  scene->meshes = qmat_calloc(2, sizeof *scene->meshes);
-  memcpy(scene->meshes, numbers, sizeof numbers);
+  if (!is_merged) {
+    scene->mesh_count = 2;
+    scene->meshes = qmat_calloc(2, sizeof *scene->meshes);
+    memcpy(scene->meshes, numbers, sizeof numbers);
+  }
   assert_int_equal(qmat_value_seal(&context, &scene->base), QMAT_OK);
   qmat_medial *medial =
       sealed_medial_mesh((const double[]){0, 0, 0, 1, 1, 0, 0, 1}, 2, (const uint32_t[]){0, 1}, 1, NULL, 0);
@@ -72,7 +77,7 @@ static qmat_file *run_on(const uint8_t *bytes, size_t size, unsigned forms, bool
                                         .collider_forms = forms,
                                         .dynamic = true};
   qmat_file *file = NULL;
-  if (qmat_gltf_enrich(&context, scene, additions, 2, false, NULL, &file) != QMAT_OK)
+  if (qmat_gltf_enrich(&context, scene, additions, is_merged ? 1 : 2, false, NULL, &file) != QMAT_OK)
     fail_msg("%s", context.error.message);
   qmat_value_release(&c->base);
   qmat_value_release(&skin->base);
@@ -80,6 +85,10 @@ static qmat_file *run_on(const uint8_t *bytes, size_t size, unsigned forms, bool
   qmat_value_release(&scene->base);
   qmat_context_uninit(&context);
   return file;
+}
+
+static qmat_file *run_on(const uint8_t *bytes, size_t size, unsigned forms, bool has_skin) {
+  return run_as(bytes, size, forms, has_skin, false);
 }
 
 static qmat_writer make_boxes(void) {
@@ -115,6 +124,25 @@ static void test_what_an_earlier_run_added_is_replaced_or_goes(void **state) {
     qmat_value_release(&second->base);
     qmat_value_release(&first->base);
     qmat_value_release(&plain->base);
+  }
+  qmat_writer_uninit(&glb);
+}
+
+/* All four orders of a run for each mesh and one for both together: nothing of the first one is left. */
+static void test_what_belongs_to_all_meshes_is_replaced_too(void **state) {
+  (void)state;
+  qmat_writer glb = make_boxes();
+  for (size_t i = 0; i < 16; i++) {
+    const unsigned forms = i & 4 ? QMAT_GLTF_KHR | QMAT_GLTF_OMI : 0;
+    const bool before = i & 1, after = i & 2, has_skin = i & 8;
+    qmat_file *alone = run_as(glb.bytes, glb.size, forms, has_skin, after),
+              *first = run_as(glb.bytes, glb.size, forms, has_skin, before),
+              *second = run_as(first->parts[0].bytes, first->parts[0].size, forms, has_skin, after);
+    assert_same_file(second, alone);
+    assert_non_null(memmem(second->parts[0].bytes, second->parts[0].size, "\"qmat_note\":\"mine\"", 18));
+    qmat_value_release(&second->base);
+    qmat_value_release(&first->base);
+    qmat_value_release(&alone->base);
   }
   qmat_writer_uninit(&glb);
 }
@@ -158,6 +186,7 @@ static void test_hulls_of_meshes_of_one_name_have_numbers_of_their_own(void **st
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_what_an_earlier_run_added_is_replaced_or_goes),
+      cmocka_unit_test(test_what_belongs_to_all_meshes_is_replaced_too),
       cmocka_unit_test(test_hulls_of_meshes_of_one_name_have_numbers_of_their_own),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

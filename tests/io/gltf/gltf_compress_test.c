@@ -194,6 +194,7 @@ static void test_what_cannot_be_taken_stays_as_it_is(void **state) {
       {"'indices':1,'extras'", "'mode':5,'indices':1,'extras'", "no indexed triangles", 0},
       {"'_CORNER':2},'indices':1}]}", "'_CORNER':0},'indices':1}]}", "used by something else", 0},
       {"'count':36", "'count':35", "invalid or unsupported", 0},
+      {"'componentType':5126", "'componentType':5122", "already quantised (KHR_mesh_quantization)", 0},
       {"'count':36", "'count':37", "invalid or unsupported", 0},
       {"'bufferView':1,'componentType':5123,'count':36", "'bufferView':0,'componentType':5121,'count':12",
        "Draco cannot encode the data", 0}, /* corner 0 again and again */
