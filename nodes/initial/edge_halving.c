@@ -7,16 +7,20 @@
 #include "core/geometry/medial_build.h"
 #include "core/geometry/triangle.h"
 #include "core/value_check.h"
+#include "nodes/measure/envelope_to_surface.h"
 
 #define NONE UINT32_MAX
 
 /* Each round halves an edge at most once. */
 enum { MOST_ROUNDS = 8 };
 
-/* Sets the inscribed sphere at an edge's midpoint; false unless the interpolated sphere leaves the solid by more than
- * the tolerance. Between two inscribed spheres it leaves by at most (length^2 - change^2) / (2 length), so short edges
- * need no distance query. */
-static bool find_middle(const qmat_surface *surface, const double *a, const double *b, double tolerance,
+/* Sets a sphere in the middle of an edge; false unless the edge leaves the solid by more than is allowed.
+ *
+ * Where the midpoint is inside, that is the inscribed sphere. Between two inscribed spheres the interpolated one leaves
+ * the solid by at most (length^2 - change^2) / (2 length), so short edges need no distance query. Where the midpoint is
+ * outside, across a concave edge or a gap, the interpolated sphere says little: others fill what is beside it. There
+ * the envelope of the edge counts, and the sphere is the point of the surface nearest to the midpoint. */
+static bool find_middle(const qmat_surface *surface, const double *a, const double *b, double tolerance, double most,
                         double middle[4]) {
   double square = 0;
   for (int k = 0; k < 4; k++) middle[k] = 0.5 * (a[k] + b[k]);
@@ -25,8 +29,15 @@ static bool find_middle(const qmat_surface *surface, const double *a, const doub
   if (!(square - change * change > 2 * tolerance * sqrt(square))) return false;
   const double limit = middle[3] - tolerance;
   const double depth = limit > 0 ? -qmat_surface_signed_distance_within(surface, middle, limit) : 0;
-  if (!(depth > 0 && depth < limit)) return false;
+  if (!(depth < limit)) return false;
   middle[3] = depth;
+  if (depth > 0) return true;
+  const double *const ends[2] = {a, b};
+  if (!(qmat_envelope_to_surface_bound(surface, ends, 2, 0.5 * most, 0.05 * most) > most)) return false;
+  double closest[3];
+  qmat_surface_distance(surface, middle, INFINITY, closest, NULL);
+  memcpy(middle, closest, sizeof closest);
+  middle[3] = 0;
   return true;
 }
 
@@ -41,7 +52,7 @@ static uint32_t middle_of(const qmat_medial *medial, const uint32_t *middles, co
 /* One round. Edges of two of the first `known` spheres stay: an earlier round has tried them. Adds the number of halved
  * edges to `*added`. */
 static qmat_status halve_edges(qmat_context *context, const qmat_surface *surface, qmat_medial *medial, size_t known,
-                               double tolerance, size_t *added) {
+                               double tolerance, double most, size_t *added) {
   qmat_arena *arena = &context->arena;
   const size_t spheres = medial->sphere_count, edges = medial->edge_count, triangles = medial->triangle_count;
   double *middle_spheres = qmat_arena_alloc(arena, edges, 4 * sizeof *middle_spheres);
@@ -56,9 +67,9 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 64)
     for (size_t e = first; e < last; e++) {
       const uint32_t a = medial->edges[2 * e], b = medial->edges[2 * e + 1];
-      const bool is_halved =
-          (a >= known || b >= known) && find_middle(surface, &medial->spheres[4 * (size_t)a],
-                                                    &medial->spheres[4 * (size_t)b], tolerance, &middle_spheres[4 * e]);
+      const bool is_halved = (a >= known || b >= known) &&
+                             find_middle(surface, &medial->spheres[4 * (size_t)a], &medial->spheres[4 * (size_t)b],
+                                         tolerance, most, &middle_spheres[4 * e]);
       middles[e] = is_halved ? 0 : NONE;
     }
   }
@@ -102,12 +113,12 @@ static qmat_status halve_edges(qmat_context *context, const qmat_surface *surfac
 }
 
 qmat_status qmat_edges_halve(qmat_context *context, const qmat_surface *surface, qmat_medial *medial, double tolerance,
-                             size_t *added) {
+                             double most, size_t *added) {
   size_t known = 0;
   *added = 0;
   for (int round = 0; round < MOST_ROUNDS; round++) {
     const size_t before = *added, count = medial->sphere_count;
-    qmat_status status = halve_edges(context, surface, medial, known, tolerance, added);
+    qmat_status status = halve_edges(context, surface, medial, known, tolerance, most, added);
     known = count;
     if (status == QMAT_OK) status = qmat_progress(context, 0, 0, "refinement");
     if (status != QMAT_OK || *added == before) return status;

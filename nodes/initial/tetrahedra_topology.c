@@ -23,9 +23,10 @@ static const double most_hole_gap = 0.01;
  * larger set counts as connected with the outside, since those of slivers have a handful. */
 enum { MOST_POCKET = 64 };
 
-/* Tetrahedra are kept, first only where that closes a loop or a void, then also where it makes way for others. Dropping
- * comes last and makes no way: all of a thin wall is near the surface, and holes in it would become slits. */
-static const struct { bool keep, neutral; } passes[] = {{true, false}, {true, true}, {false, false}};
+/* Tetrahedra change sides first only where one alone closes a loop or void, or opens one: a few that join the sides of
+ * a narrow gap are dropped rather than the gap filled. Then tetrahedra are kept also where that makes way for others.
+ * Dropping makes no way: all of a thin wall is near the surface, and holes in it would become slits. */
+static const struct { bool keep, neutral; } passes[] = {{true, false}, {false, false}, {true, true}, {false, false}};
 
 /* A pass repeats while a round changes more than this share of what the pass has changed. A round tries every
  * tetrahedron beside the surface, and late rounds change few. */

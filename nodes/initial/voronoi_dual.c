@@ -243,7 +243,7 @@ static qmat_status make_medial(qmat_dual_complex *d, qmat_medial *medial, size_t
   qmat_status status =
       qmat_medial_set_simplices(d->context, medial, d->edges, d->edge_count, d->triangles, d->triangle_count);
   if (status == QMAT_OK && d->params->max_envelope_error > 0)
-    status = qmat_edges_halve(d->context, d->surface, medial, d->params->max_envelope_error, refined);
+    status = qmat_edges_halve(d->context, d->surface, medial, d->params->max_envelope_error, d->epsilon, refined);
   if (status == QMAT_OK) status = set_regions(d, medial);
   if (status != QMAT_OK) return status;
   qmat_frame_spheres_to_model(qmat_surface_frame(d->surface), medial->spheres, medial->sphere_count, medial->spheres);
