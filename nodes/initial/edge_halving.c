@@ -7,36 +7,34 @@
 #include "core/geometry/medial_build.h"
 #include "core/geometry/triangle.h"
 #include "core/value_check.h"
-#include "nodes/measure/envelope_to_surface.h"
 
 #define NONE UINT32_MAX
 
 /* Each round halves an edge at most once. */
 enum { MOST_ROUNDS = 8 };
 
-/* Sets a sphere in the middle of an edge; false unless the edge leaves the solid by more than is allowed.
- *
- * Where the midpoint is inside, that is the inscribed sphere. Between two inscribed spheres the interpolated one leaves
- * the solid by at most (length^2 - change^2) / (2 length), so short edges need no distance query. Where the midpoint is
- * outside, across a concave edge or a gap, the interpolated sphere says little: others fill what is beside it. There
- * the envelope of the edge counts, and the sphere is the point of the surface nearest to the midpoint. */
+/* Sets a sphere at an edge's midpoint; false unless the interpolated one leaves the solid by more than is allowed:
+ * `tolerance` where the midpoint is inside, `most` where it is outside. It leaves it by its radius less the depth of
+ * its centre. Between two inscribed spheres that is at most (length^2 - change^2) / (2 length), so short edges need no
+ * distance query. The new sphere is inscribed or, for a midpoint outside, the nearest point of the surface. */
 static bool find_middle(const qmat_surface *surface, const double *a, const double *b, double tolerance, double most,
                         double middle[4]) {
-  double square = 0;
+  double square = 0, nearest[3];
   for (int k = 0; k < 4; k++) middle[k] = 0.5 * (a[k] + b[k]);
   for (int k = 0; k < 3; k++) square += (a[k] - b[k]) * (a[k] - b[k]);
   const double change = a[3] - b[3];
   if (!(square - change * change > 2 * tolerance * sqrt(square))) return false;
   const double limit = middle[3] - tolerance;
   const double depth = limit > 0 ? -qmat_surface_signed_distance_within(surface, middle, limit) : 0;
-  if (!(depth < limit)) return false;
-  middle[3] = depth;
-  if (depth > 0) return true;
-  const double *const ends[2] = {a, b};
-  if (!(qmat_envelope_to_surface_bound(surface, ends, 2, 0.5 * most, 0.05 * most) > most)) return false;
-  double closest[3];
-  qmat_surface_distance(surface, middle, INFINITY, closest, NULL);
-  memcpy(middle, closest, sizeof closest);
+  const bool is_far = isinf(depth); /* on either side */
+  if (is_far ? qmat_surface_inside(surface, middle) : !(depth < limit)) return false;
+  if (!is_far && depth > 0) {
+    middle[3] = depth;
+    return true;
+  }
+  const double outside = qmat_surface_distance(surface, middle, INFINITY, nearest, NULL);
+  if (!(middle[3] + outside > most)) return false;
+  memcpy(middle, nearest, sizeof nearest);
   middle[3] = 0;
   return true;
 }

@@ -4,12 +4,12 @@
 
 #include "core/geometry/surface.h"
 
-/* Halves medial edges that leave the solid, and the slabs at these edges, until none does or after eight rounds. Sparse
- * samples give long medial edges, whose cones pass through concave regions of the surface. An edge whose midpoint is
- * inside leaves the solid where its midpoint sphere does so by more than `tolerance`; its new sphere is inscribed. An
- * edge whose midpoint is outside leaves it where its cone does so by more than `most`, beyond which no result is within
- * epsilon; its new sphere is the point of the surface nearest to the midpoint. Both are in the unit frame and > 0.
- * `medial` is in the unit frame and not yet sealed; its new spheres come last. `*added` is their number.
+/* Halves medial edges whose midpoint spheres leave the solid, and the slabs at these edges, until none does or after
+ * eight rounds. Sparse samples give long medial edges, whose interpolated spheres pass through concave regions of the
+ * surface. A midpoint sphere leaves the solid by its radius less the depth of its centre: by more than `tolerance`
+ * where the centre is inside, or by more than `most` where it is outside, across a concave edge or a narrow gap. Both
+ * are > 0 and in the unit frame. The new sphere is inscribed; for a midpoint outside it is the nearest point of the
+ * surface. `medial` is in the unit frame and not yet sealed; its new spheres come last. `*added` is their number.
  * QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. */
 qmat_status qmat_edges_halve(qmat_context *context, const qmat_surface *surface, qmat_medial *medial, double tolerance,
                              double most, size_t *added);

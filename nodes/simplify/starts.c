@@ -12,7 +12,7 @@ typedef struct all_starts {
   const qmat_simplify_params *params;
   size_t rule_count;  /* 2 where creases are not kept and kept */
   qmat_medial *bare;  /* the initial medial mesh without features, where creases are not kept */
-  size_t fewest_kept; /* spheres of a result that keeps creases */
+  size_t fewest_kept; /* spheres of a result that keeps creases, had they no ends */
   qmat_simplified *results;
   _Atomic size_t
       *free_counts; /* per seed: the spheres without kept creases, SIZE_MAX beyond epsilon; 0: not known yet */
@@ -46,7 +46,9 @@ static qmat_status leave_features(qmat_context *context, const qmat_medial *medi
   return QMAT_OK;
 }
 
-/* Corners, where a crease ends or several meet, stay where creases are kept, and another sphere fills the interior. */
+/* Corners, where several creases meet, stay where creases are kept, and another sphere fills the interior. The ends of
+ * a crease stay too, but beside narrow gaps and thin walls creases are in pieces, whose ends say nothing about what the
+ * solid needs. */
 static qmat_status count_fewest_kept(qmat_context *context, const qmat_simplification *s, size_t *fewest) {
   const qmat_medial *initial = s->initial;
   const double *spheres = s->state.spheres;
@@ -60,7 +62,7 @@ static qmat_status count_fewest_kept(qmat_context *context, const qmat_simplific
   }
   *fewest = 1;
   for (size_t v = initial->sheet_sphere_count; v < initial->sphere_count; v++)
-    *fewest += spheres[4 * v + 3] == 0 && segments[v] != 2;
+    *fewest += spheres[4 * v + 3] == 0 && segments[v] > 2;
   return QMAT_OK;
 }
 

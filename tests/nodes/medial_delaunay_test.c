@@ -889,6 +889,20 @@ static void test_thin_walls_around_a_void_are_closed(void **state) {
   }
 }
 
+/* Tetrahedra between two books make loops with the board below them. They are dropped, rather than the gap filled. */
+static void test_narrow_gaps_of_one_solid_stay_open(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, pipeline_books(6), "", "epsilon=0.01");
+  const qmat_topology topology = topology_of(&p);
+  assert_int_equal(topology.components, 1);
+  assert_int_equal(topology.loops, 0);
+  assert_int_equal(topology.voids, 0);
+  assert_true(pipeline_count(p.report, "dropped_for_topology") > 0);
+  assert_true(pipeline_count(p.report, "kept_for_topology") < 20);
+  pipeline_free(&p);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_regular_tetrahedron),
@@ -925,6 +939,7 @@ int main(void) {
       cmocka_unit_test(test_solids_with_a_narrow_gap_stay_apart),
       cmocka_unit_test(test_void_is_no_gap_between_solids),
       cmocka_unit_test(test_thin_walls_around_a_void_are_closed),
+      cmocka_unit_test(test_narrow_gaps_of_one_solid_stay_open),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -227,6 +227,18 @@ static inline qmat_mesh *pipeline_narrow_gap(void) {
   return mesh;
 }
 
+/* Books side by side on a board, one solid. The gaps between them have 4 % of their thickness. */
+static inline qmat_mesh *pipeline_books(int count) {
+  qmat_mesh *mesh = shape_new();
+  for (int i = 0; i < count; i++) shape_add_box(mesh, 0.052 * i, 0, 0, 0.052 * i + 0.05, 0.21, 0.35, false);
+  shape_add_box(mesh, -0.02, -0.05, -0.03, 0.052 * count + 0.02, 0.26, 0, false);
+  qmat_value *outputs[PIPELINE_MOST_PORTS];
+  pipeline_must_run(0, "mesh.solid", "", (const qmat_value *[]){&shape_seal(mesh)->base}, outputs);
+  qmat_value_release(outputs[1]);
+  qmat_value_release(&mesh->base);
+  return (qmat_mesh *)outputs[0];
+}
+
 /* The spheres of radius zero. */
 static inline size_t pipeline_features(const qmat_medial *medial) {
   size_t count = 0;
