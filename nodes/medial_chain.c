@@ -113,7 +113,7 @@ static const qmat_library *const libraries[] = {&qmat_library_embree, NULL};
 
 const qmat_node qmat_node_medial_chain = {
     .name = "medial.chain",
-    .version = 16,
+    .version = 17,
     .summary = "Collapses all medial edges and records the collapses, for any level of detail",
     .doc =
         "Collapses as medial.simplify does with on_exceed=raise or stop and without a bound, until no edge is left. "

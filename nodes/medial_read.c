@@ -37,7 +37,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
 
 const qmat_node qmat_node_medial_read = {
     .name = "medial.read",
-    .version = 3,
+    .version = 4,
     .summary = "Reads a medial mesh from a .ma, glTF, USD or PLY file",
     .doc =
         "Checks numbers and indices. Sorts edges and triangles, leaves out duplicates, and adds the edges of triangles "

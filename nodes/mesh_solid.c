@@ -660,7 +660,7 @@ static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_librar
 
 const qmat_node qmat_node_mesh_solid = {
     .name = "mesh.solid",
-    .version = 10,
+    .version = 11,
     .summary = "Makes a solid, and sheets, of any triangles",
     .doc =
         "A component is a set of triangles connected across edges. Fins, and walls inside, are components of their "
