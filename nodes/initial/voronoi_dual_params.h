@@ -35,7 +35,8 @@ extern const char *const qmat_incentre_choices[], *const qmat_radius_choices[];
           qmat_voronoi_dual_params, merge, "epsilon", 0.1, 0, 1,                                                       \
           "Adjacent medial vertices become one if they are no farther apart than this; 0: only if they coincide"),     \
       QMAT_LENGTH(qmat_voronoi_dual_params, max_envelope_error, 0.0025, 0, 1,                                          \
-                  "Medial edges whose cones leave the solid by more than this are halved; 0: never"),                  \
+                  "Medial edges whose cones leave the solid by more than this are halved, or by more than epsilon "    \
+                  "where their middle is outside; 0: never"),                                                          \
       QMAT_FLOAT(qmat_voronoi_dual_params, thinning_tolerance, "epsilon", 0.1, 0, 1,                                   \
                  "A sample is left out of the triangulation if a kept one nearby faces the same way and both lie "     \
                  "within this of each other's tangent plane; 0: all are triangulated")
