@@ -20,6 +20,7 @@ typedef struct shared_items {
 /* A thread and its item. Only the thread that runs the node may call the progress function of the run. */
 typedef struct item_thread {
   shared_items *shared;
+  qmat_context *own; /* of its items */
   bool is_main_thread;
   size_t item;
 } item_thread;
@@ -40,6 +41,7 @@ static bool item_may_continue(void *user, const char *node_id, const char *node_
   (void)total;
   (void)unit;
   const item_thread *here = user;
+  here->own->progress_time = 0; /* each poll comes here: the outer context limits how often the run is asked */
   if (here->is_main_thread) ask_outer(here->shared);
   return is_needed(here->shared, here->item);
 }
@@ -67,6 +69,7 @@ qmat_status qmat_run_side_by_side(qmat_context *context, size_t count, qmat_item
                         .threads = 1,
                         .node_id = context->node_id,
                         .node_type = context->node_type};
+    here.own = &own;
 #pragma omp master
     here.is_main_thread = true;
     while ((here.item = atomic_fetch_add(&shared.next, 1)) < count) {

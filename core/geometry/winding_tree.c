@@ -60,8 +60,7 @@ double qmat_winding_tree_number(const qmat_winding_tree *tree, const double poin
     qmat_subtract(node->centre, point, offset);
     const double square = qmat_dot(offset, offset);
     if (square > DIPOLE_BETA * DIPOLE_BETA * node->radius * node->radius) {
-      winding +=
-          qmat_dot(node->area_vector, offset) / (square * sqrt(square)) * 0.0795774715459476678844; /* 1 / (4 pi) */
+      winding += qmat_dot(node->area_vector, offset) / (square * sqrt(square)) * (1 / (4 * QMAT_PI));
     } else if (index >= tree->leaf_count) {
       size_t begin, end;
       leaf_range(tree, index - tree->leaf_count, &begin, &end);

@@ -118,6 +118,26 @@ static void test_it_can_be_cancelled(void **state) {
   assert_int_equal(atomic_load(&all.done), 0);
 }
 
+/* Polls in the middle of its work. */
+static qmat_status poll_five_times(void *user, qmat_context *own, size_t item) {
+  (void)user, (void)item;
+  qmat_status status = QMAT_OK;
+  for (int i = 0; i < 5 && status == QMAT_OK; i++) status = qmat_progress(own, 1, 2, "");
+  return status;
+}
+
+/* Only the outer context limits how often the run is asked: on one thread the number of calls depends on no clock. */
+static void test_each_poll_of_an_item_reaches_the_outer_context(void **state) {
+  (void)state;
+  qmat_context context = {.threads = 1, .progress = may_go_on};
+  stopper stop = {.context = &context, .stop_at = SIZE_MAX};
+  const _Atomic size_t done = 1;
+  context.progress_user = &stop;
+  assert_int_equal(qmat_run_side_by_side(&context, 3, poll_five_times, NULL, &done, 3, "items"), QMAT_OK);
+  assert_int_equal(stop.calls, 1 + 3 * 5);
+  qmat_context_uninit(&context);
+}
+
 /* One item for eight threads: the main thread hears of a cancel while another has the item. */
 static void test_it_can_be_cancelled_while_the_main_thread_waits(void **state) {
   (void)state;
@@ -137,6 +157,7 @@ int main(void) {
       cmocka_unit_test(test_a_failure_ends_it_with_its_error),
       cmocka_unit_test(test_the_first_failing_item_gives_the_error),
       cmocka_unit_test(test_it_can_be_cancelled),
+      cmocka_unit_test(test_each_poll_of_an_item_reaches_the_outer_context),
       cmocka_unit_test(test_it_can_be_cancelled_while_the_main_thread_waits),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
