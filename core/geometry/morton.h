@@ -46,4 +46,16 @@ static inline void qmat_curve_sort(qmat_curve_item *items, size_t count) {
   qsort(items, count, sizeof *items, qmat_compare_curve_items);
 }
 
+/* The items of a node of a complete binary tree over `count` items along the curve, from `*begin` to before `*end`.
+ * Node 1 is the root; the children of node k are 2 k and 2 k + 1, and the leaves start at `leaf_count`, a power of two.
+ */
+static inline void qmat_curve_node_items(size_t count, size_t leaf_count, size_t node, size_t *begin, size_t *end) {
+  size_t first = node, last = node + 1;
+  while (first < leaf_count) first *= 2, last *= 2;
+  first -= leaf_count, last -= leaf_count;
+  const size_t share = count / leaf_count, rest = count % leaf_count; /* leaf * count could overflow */
+  *begin = first * share + first * rest / leaf_count;
+  *end = last * share + last * rest / leaf_count;
+}
+
 #endif

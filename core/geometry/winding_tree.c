@@ -18,8 +18,7 @@ typedef struct winding_node {
   double radius; /* of a ball around the centre that contains all its triangles */
 } winding_node;
 
-/* Node 1 is the root; node k has the children 2 k and 2 k + 1; leaf k is node leaf_count + k and contains the triangles
- * order[k * count / leaf_count .. (k + 1) * count / leaf_count). */
+/* A tree over the triangles along a curve (qmat_curve_node_items). */
 struct qmat_winding_tree {
   const double *positions;
   const uint32_t *triangles;
@@ -40,12 +39,8 @@ static double solid_angle(const qmat_winding_tree *tree, uint32_t triangle, cons
   return y == 0 ? 0 : atan2(y, x) * (1 / (2 * QMAT_PI));
 }
 
-static void leaf_range(const qmat_winding_tree *tree, size_t leaf, size_t *begin, size_t *end) {
-  const size_t n = tree->count;
-  /* This is leaf * n / leaf_count without overflow. */
-  const size_t share = n / tree->leaf_count, rest = n % tree->leaf_count;
-  *begin = leaf * share + leaf * rest / tree->leaf_count;
-  *end = (leaf + 1) * share + (leaf + 1) * rest / tree->leaf_count;
+static void items_of(const qmat_winding_tree *tree, size_t node, size_t *begin, size_t *end) {
+  qmat_curve_node_items(tree->count, tree->leaf_count, node, begin, end);
 }
 
 double qmat_winding_tree_number(const qmat_winding_tree *tree, const double point[3]) {
@@ -63,7 +58,7 @@ double qmat_winding_tree_number(const qmat_winding_tree *tree, const double poin
       winding += qmat_dot(node->area_vector, offset) / (square * sqrt(square)) * (1 / (4 * QMAT_PI));
     } else if (index >= tree->leaf_count) {
       size_t begin, end;
-      leaf_range(tree, index - tree->leaf_count, &begin, &end);
+      items_of(tree, index, &begin, &end);
       for (size_t i = begin; i < end; i++) winding += solid_angle(tree, tree->order[i], point);
     } else {
       stack[depth++] = 2 * index + 1;
@@ -127,10 +122,8 @@ static void fill_inner(const qmat_winding_tree *tree, size_t index, double *area
     node->area_vector[k] = left->area_vector[k] + right->area_vector[k];
   }
   /* Computed from the corners: from the children's balls, radii near the root would be twice too large. */
-  size_t first = index, last = index + 1, begin, end, unused;
-  while (first < tree->leaf_count) first *= 2, last *= 2;
-  leaf_range(tree, first - tree->leaf_count, &begin, &unused);
-  leaf_range(tree, last - 1 - tree->leaf_count, &unused, &end);
+  size_t begin, end;
+  items_of(tree, index, &begin, &end);
   node->radius = farthest_corner(tree, begin, end, node->centre);
 }
 
@@ -168,7 +161,7 @@ static qmat_status build(qmat_context *context, const uint32_t *chosen, qmat_win
     for (size_t index = level; index < 2 * level; index++) {
       if (level == leaf_count) {
         size_t begin, end;
-        leaf_range(tree, index - leaf_count, &begin, &end);
+        items_of(tree, index, &begin, &end);
         fill_leaf(tree, tree->nodes + index, begin, end, areas + index);
       } else {
         fill_inner(tree, index, areas);

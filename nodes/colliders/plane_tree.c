@@ -22,23 +22,15 @@ typedef struct qmat_plane_node {
   double rise;                /* of `place` over a plane, at most */
 } plane_node;
 
-static void leaf_range(const qmat_plane_tree *t, size_t leaf, size_t *begin, size_t *end) {
-  *begin = leaf * t->count / t->leaf_count;
-  *end = (leaf + 1) * t->count / t->leaf_count;
-}
-
 /* The planes of a node. */
-static void range_of(const qmat_plane_tree *t, size_t node, size_t *begin, size_t *end) {
-  size_t first = node, last = node + 1, unused;
-  while (first < t->leaf_count) first *= 2, last *= 2;
-  leaf_range(t, first - t->leaf_count, begin, &unused);
-  leaf_range(t, last - 1 - t->leaf_count, &unused, end);
+static void items_of(const qmat_plane_tree *t, size_t node, size_t *begin, size_t *end) {
+  qmat_curve_node_items(t->count, t->leaf_count, node, begin, end);
 }
 
 static void fill_node(const qmat_plane_tree *t, const double (*places)[3], size_t number) {
   plane_node *node = &t->nodes[number];
   size_t begin, end;
-  range_of(t, number, &begin, &end);
+  items_of(t, number, &begin, &end);
   *node = (plane_node){.rise = -INFINITY};
   for (size_t i = begin; i < end; i++)
     for (int k = 0; k < 3; k++) {
@@ -113,7 +105,7 @@ size_t qmat_plane_tree_farthest(const qmat_plane_tree *tree, const double *point
       continue;
     }
     size_t begin, end;
-    leaf_range(tree, number - tree->leaf_count, &begin, &end);
+    items_of(tree, number, &begin, &end);
     if (visited) *visited += end - begin;
     for (size_t i = begin; i < end; i++) {
       const uint32_t id = tree->order[i].id;

@@ -12,7 +12,7 @@ typedef struct qmat_plane_tree {
   const double *planes;
   size_t count, leaf_count, room;
   double slack;                  /* more than rounding adds to a height */
-  struct qmat_plane_node *nodes; /* 1 is the root; the children of k are 2 k and 2 k + 1 */
+  struct qmat_plane_node *nodes; /* a tree over `order` (qmat_curve_node_items) */
   struct qmat_curve_item *order; /* the planes along a curve */
 } qmat_plane_tree;
 

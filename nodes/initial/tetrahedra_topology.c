@@ -52,7 +52,7 @@ typedef struct mending {
   uint8_t *pocket_sizes;  /* of those that lead a set; MOST_POCKET + 1: connected with the outside */
   uint32_t *marks, stamp; /* per sample or tetrahedron: those of the newest search */
   uint32_t *found;        /* 2 per tetrahedron, or one per sample: those of the newest search */
-  uint32_t *changed;      /* tetrahedra that changed sides, in order */
+  uint32_t *changed;      /* tetrahedra that changed sides, in order; a pass adds each once, so room for two of each */
   size_t changed_count;
   qmat_item_queue queue;
 } mending;
@@ -333,7 +333,11 @@ static bool change(mending *m, uint32_t cell, bool keep, bool neutral) {
   return true;
 }
 
-/* Reverts the changes that leave the homotopy type as it is, the newest first. */
+static bool is_changed(const mending *m, uint32_t cell) {
+  return is_kept(m->d, cell) != (m->before[cell] != QMAT_CELL_DROPPED);
+}
+
+/* Reverts the changes that leave the homotopy type as it is, the newest first. What is as before leaves the list. */
 static void revert_neutral(mending *m) {
   qmat_dual_complex *d = m->d;
   size_t reverted;
@@ -341,12 +345,15 @@ static void revert_neutral(mending *m) {
     reverted = 0;
     for (size_t i = m->changed_count; i-- > 0;) {
       const uint32_t cell = m->changed[i];
-      if (is_kept(d, cell) == (m->before[cell] != QMAT_CELL_DROPPED)) continue;
-      if (!is_tree(link_of(d, cell))) continue;
+      if (!is_changed(m, cell) || !is_tree(link_of(d, cell))) continue;
       d->kinds[cell] = m->before[cell];
       reverted++;
     }
   } while (reverted > 0);
+  size_t left = 0;
+  for (size_t i = 0; i < m->changed_count; i++)
+    if (is_changed(m, m->changed[i])) m->changed[left++] = m->changed[i];
+  m->changed_count = left;
 }
 
 /* Keeps (or drops) tetrahedra, the nearest to the surface first, until the Betti numbers are right or little changes.
