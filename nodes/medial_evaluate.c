@@ -317,7 +317,7 @@ static const qmat_port outputs[] = {
 
 const qmat_node qmat_node_medial_evaluate = {
     .name = "medial.evaluate",
-    .version = 18,
+    .version = 19,
     .summary = "Proves bounds of the distance between a medial mesh and a surface",
     .doc =
         "surface_to_envelope bounds the distance from any point of the surface to the solid that the spheres, cones "

@@ -23,9 +23,9 @@ static bool find_middle(const qmat_surface *surface, const double *a, const doub
   for (int k = 0; k < 4; k++) middle[k] = 0.5 * (a[k] + b[k]);
   for (int k = 0; k < 3; k++) square += (a[k] - b[k]) * (a[k] - b[k]);
   const double change = a[3] - b[3];
-  if (!(square - change * change > 2 * tolerance * sqrt(square))) return false;
+  if (!(square - change * change > 2 * fmin(tolerance, most) * sqrt(square))) return false;
   const double limit = middle[3] - tolerance;
-  const double depth = limit > 0 ? -qmat_surface_signed_distance_within(surface, middle, limit) : 0;
+  const double depth = limit > 0 ? -qmat_surface_signed_distance_within(surface, middle, limit) : INFINITY;
   const bool is_far = isinf(depth); /* on either side */
   if (is_far ? qmat_surface_inside(surface, middle) : !(depth < limit)) return false;
   if (!is_far && depth > 0) {

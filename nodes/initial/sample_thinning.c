@@ -59,12 +59,19 @@ typedef struct thinning {
   sample_grid grid;
 } thinning;
 
-static bool represents(const thinning *t, uint32_t kept, uint32_t sample) {
+bool qmat_samples_are_level(const double *point, const double *normal, const double *other, const double *other_normal,
+                            double tolerance) {
   double offset[3];
-  for (size_t k = 0; k < 3; k++) offset[k] = t->points[3 * (size_t)sample + k] - t->points[3 * (size_t)kept + k];
-  const double *mine = &t->normals[3 * (size_t)sample], *theirs = &t->normals[3 * (size_t)kept];
-  return qmat_dot(offset, offset) < t->radii[sample] * t->radii[sample] && qmat_dot(mine, theirs) >= least_cosine &&
-         fabs(qmat_dot(offset, mine)) <= t->tolerance && fabs(qmat_dot(offset, theirs)) <= t->tolerance;
+  qmat_subtract(point, other, offset);
+  return qmat_dot(normal, other_normal) >= least_cosine && fabs(qmat_dot(offset, normal)) <= tolerance &&
+         fabs(qmat_dot(offset, other_normal)) <= tolerance;
+}
+
+static bool represents(const thinning *t, uint32_t kept, uint32_t sample) {
+  const double *mine = &t->points[3 * (size_t)sample], *theirs = &t->points[3 * (size_t)kept];
+  return qmat_point_distance(mine, theirs) < t->radii[sample] &&
+         qmat_samples_are_level(mine, &t->normals[3 * (size_t)sample], theirs, &t->normals[3 * (size_t)kept],
+                                t->tolerance);
 }
 
 /* The kept sample that represents this one, or the sample itself. The cells of its level are at least twice as wide as
@@ -126,8 +133,8 @@ static void find_normals(const qmat_surface *surface, const qmat_samples *sample
   }
 }
 
-/* The radius of a sample, as a share of the thickness, and its upper bound in diagonals. */
-static const double thickness_share = 0.25, longest_reach = 0.01;
+/* The radius of a sample, as a share of the thickness. */
+static const double thickness_share = 0.25;
 
 qmat_status qmat_representatives_find(qmat_context *context, const qmat_surface *surface, const qmat_samples *samples,
                                       const double *points, const double *thickness, double tolerance,
@@ -143,8 +150,8 @@ qmat_status qmat_representatives_find(qmat_context *context, const qmat_surface 
   find_normals(surface, samples, normals);
   const double diagonal = qmat_surface_frame(surface)->diagonal;
   for (size_t i = 0; i < count; i++) {
-    radii[i] = fmin(fmax(thickness_share * (thickness[i] / diagonal), tolerance), longest_reach);
+    radii[i] = fmin(fmax(thickness_share * (thickness[i] / diagonal), tolerance), qmat_longest_reach);
     if (reaches) radii[i] = fmin(radii[i], reaches[i]);
   }
-  return qmat_samples_thin(context, points, normals, radii, count, longest_reach, tolerance, representatives);
+  return qmat_samples_thin(context, points, normals, radii, count, qmat_longest_reach, tolerance, representatives);
 }

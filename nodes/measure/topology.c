@@ -2,6 +2,7 @@
 #include "nodes/measure/topology.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "core/disjoint_sets.h"
 #include "core/geometry/half_edges.h"
@@ -12,17 +13,18 @@
 /* The distance from a shell of the points that test its sides, in diagonals. */
 static const double beside = 1e-5;
 
-/* Joins the triangles at every edge into shells, and their corners into fans. `*paired` becomes false at an edge that
- * does not have two triangles. */
+/* Joins the triangles at every edge that has two into shells, and their corners into fans. `is_open`, per triangle: set
+ * where an edge has another number. */
 static qmat_status join_at_edges(qmat_context *context, const qmat_mesh *mesh, uint32_t *shells, uint32_t *fans,
-                                 bool *paired) {
+                                 uint8_t *is_open) {
   qmat_half_edges e;
   const qmat_status status =
       qmat_half_edges_sort(context, mesh->vertex_count, mesh->triangle_count, mesh->triangles, &e);
-  for (size_t i = 0; status == QMAT_OK && *paired && i < e.count; i += 2) {
-    *paired = qmat_edge_last(&e, i) == i + 2;
-    if (!*paired) break;
-    const uint32_t a = e.order[i], b = e.order[i + 1];
+  for (size_t i = 0, last; status == QMAT_OK && i < e.count; i = last) {
+    last = qmat_edge_last(&e, i);
+    const uint32_t a = e.order[i], b = e.order[last - 1];
+    for (size_t k = i; last - i != 2 && k < last; k++) is_open[e.order[k] / 3] = 1;
+    if (last - i != 2) continue;
     const bool same_way = qmat_half_edge_start(&e, a) == qmat_half_edge_start(&e, b);
     qmat_sets_join(shells, a / 3, b / 3);
     qmat_sets_join(fans, a, same_way ? b : qmat_half_edge_next(b));
@@ -36,6 +38,7 @@ typedef struct shell {
   size_t fan_count, triangle_count;
   double volume, area, largest_area; /* six times the volume, twice the areas */
   uint32_t largest;                  /* triangle */
+  bool is_open;
 } shell;
 
 static void triangle_vectors(const qmat_surface *surface, size_t triangle, double normal[3], double centre[3]) {
@@ -75,28 +78,29 @@ static bool separates(const qmat_surface *surface, const shell *s) {
 static const double least_volume = 1e-5;
 
 /* Closed flat shells of sheets enclose no void: each counts as the thin solid that it bounds. `sheets`: the topology of
- * the mesh's sheets as a complex, where a shell of genus g has 2 g loops and a void. Left as it is where any edge of
- * the sheets does not have two triangles. */
+ * the mesh's sheets as a complex, where a shell of genus g has 2 g loops and a void. */
 static qmat_status flatten_shells(qmat_context *context, const qmat_surface *surface, qmat_topology *sheets) {
   qmat_mesh mesh = *qmat_surface_mesh(surface);
-  const size_t solids = mesh.triangle_count - mesh.sheet_triangle_count;
+  const size_t solids = qmat_solid_triangle_count(&mesh);
   mesh.triangles += 3 * solids;
-  mesh.triangle_count = mesh.sheet_triangle_count;
+  mesh.triangle_count = mesh.sheet_triangle_count - mesh.flap_triangle_count;
   uint32_t *shells = qmat_sets_new(context, mesh.triangle_count),
            *fans = qmat_sets_new(context, 3 * mesh.triangle_count);
   shell *sums = qmat_arena_calloc(&context->arena, mesh.triangle_count, sizeof *sums);
-  bool paired = true;
-  if (!shells || !fans || !sums) return qmat_fail_memory(context, "the topology");
-  const qmat_status status = join_at_edges(context, &mesh, shells, fans, &paired);
-  if (status != QMAT_OK || !paired) return status;
+  uint8_t *is_open = qmat_arena_calloc(&context->arena, mesh.triangle_count, sizeof *is_open);
+  if (!shells || !fans || !sums || !is_open) return qmat_fail_memory(context, "the topology");
+  const qmat_status status = join_at_edges(context, &mesh, shells, fans, is_open);
+  if (status != QMAT_OK) return status;
   for (size_t t = 0; t < mesh.triangle_count; t++) {
     double normal[3], centre[3];
+    shell *sum = &sums[qmat_set_leader(shells, (uint32_t)t)];
     triangle_vectors(surface, solids + t, normal, centre);
-    add_to_shell(&sums[qmat_set_leader(shells, (uint32_t)t)], fans, t, normal, centre);
+    add_to_shell(sum, fans, t, normal, centre);
+    sum->is_open |= is_open[t];
   }
   for (size_t t = 0; t < mesh.triangle_count; t++) {
     const shell *sum = &sums[t];
-    if (sum->triangle_count == 0 || sheets->voids == 0) continue;
+    if (sum->triangle_count == 0 || sum->is_open || sheets->voids == 0) continue;
     const double area = sum->area / 2, volume = sum->volume / 6;
     const size_t genus = (2 + sum->triangle_count / 2 - sum->fan_count) / 2;
     if (fabs(volume) > least_volume * area * sqrt(area) || genus > sheets->loops) continue;
@@ -137,8 +141,10 @@ qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *su
   uint32_t *shells = qmat_sets_new(context, mesh->triangle_count),
            *fans = qmat_sets_new(context, 3 * mesh->triangle_count);
   shell *sums = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *sums);
-  if (!shells || !fans || !sums) return qmat_fail_memory(context, "the topology");
-  const qmat_status status = join_at_edges(context, mesh, shells, fans, &topology->known);
+  uint8_t *is_open = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *is_open);
+  if (!shells || !fans || !sums || !is_open) return qmat_fail_memory(context, "the topology");
+  const qmat_status status = join_at_edges(context, mesh, shells, fans, is_open);
+  topology->known = !memchr(is_open, 1, mesh->triangle_count);
   if (!topology->known) topology->why_not = "an edge has more than two triangles: solids touch along it";
   if (status != QMAT_OK || !topology->known) return status;
   for (size_t t = 0; t < mesh->triangle_count; t++) {

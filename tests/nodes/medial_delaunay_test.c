@@ -554,6 +554,16 @@ static void test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller(
   pipeline_free(&p);
 }
 
+/* A cylinder of facets narrower than the distance between samples: long flat tetrahedra on its surface are left out. */
+static void test_narrow_facets_have_few_incentres(void **state) {
+  (void)state;
+  pipeline p;
+  pipeline_make(&p, shape_seal(shape_prism(256, 2)), "", "epsilon=0.01 incentres=all");
+  assert_true(2 * pipeline_count(p.report, "incentres") < pipeline_count(p.report, "samples_triangulated"));
+  assert_int_equal(pipeline_count(p.report, "components"), 1);
+  pipeline_free(&p);
+}
+
 static void test_all_incentres_add_spheres_and_keep_the_others(void **state) {
   (void)state;
   pipeline p;
@@ -925,6 +935,7 @@ int main(void) {
       cmocka_unit_test(test_flat_regions_are_thinned_and_every_sample_has_a_sphere),
       cmocka_unit_test(test_merging_and_thinning_follow_epsilon),
       cmocka_unit_test(test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller),
+      cmocka_unit_test(test_narrow_facets_have_few_incentres),
       cmocka_unit_test(test_all_incentres_add_spheres_and_keep_the_others),
       cmocka_unit_test(test_samples_all_have_a_sphere),
       cmocka_unit_test(test_moving_scaling_and_shuffling_change_little),

@@ -63,6 +63,26 @@ static void test_an_edge_near_enough_stays_whole(void **state) {
   assert_int_equal(halve(make_boxes(), across, 0.01, 0.66, middle), 0);
 }
 
+/* Two plates of thickness 0.01 with a gap of 0.5: their spheres are smaller than the tolerance. */
+static void test_an_edge_between_thin_walls_is_halved_on_the_surface(void **state) {
+  (void)state;
+  const double spheres[8] = {0.5, 0.5, 0.005, 0.005, 2, 0.5, 0.005, 0.005};
+  double middle[4];
+  for (int apart = 0; apart < 2; apart++) {
+    qmat_mesh *plates = shape_box(1, 1, 0.01);
+    shape_add_box(plates, apart ? 1.5 : 1, 0, 0, 2.5, 1, 0.01, false);
+    assert_int_equal(halve(plates, spheres, 0.01, 0.05, middle), apart);
+  }
+}
+
+/* The sphere halfway leaves the solid by less than the tolerance, and by more than edges outside may. */
+static void test_edges_outside_have_a_limit_of_their_own(void **state) {
+  (void)state;
+  double middle[4];
+  assert_int_equal(halve(make_boxes(), across, 0.75, 0.66, middle), 0);
+  assert_int_equal(halve(make_boxes(), across, 0.75, 0.64, middle), 1);
+}
+
 /* In a bar of 1 by 1 the sphere halfway between two of radius 0.7, which leave it already, is that of radius 0.5. */
 static void test_an_edge_inside_is_halved_by_an_inscribed_sphere(void **state) {
   (void)state;
@@ -78,6 +98,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_an_edge_across_the_outside_is_halved_on_the_surface),
       cmocka_unit_test(test_an_edge_near_enough_stays_whole),
+      cmocka_unit_test(test_an_edge_between_thin_walls_is_halved_on_the_surface),
+      cmocka_unit_test(test_edges_outside_have_a_limit_of_their_own),
       cmocka_unit_test(test_an_edge_inside_is_halved_by_an_inscribed_sphere),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

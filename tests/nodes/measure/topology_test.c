@@ -333,6 +333,21 @@ static void test_flat_shells_of_sheets_enclose_no_void(void **state) {
   check_solid(mesh, 1, 0, 1);
 }
 
+/* The thin box encloses no void, whatever lies beside it; the box with volume keeps its own. */
+static void test_flat_shells_beside_open_sheets_enclose_no_void(void **state) {
+  (void)state;
+  for (int flaps = 0; flaps < 2; flaps++) {
+    qmat_mesh *mesh = shape_box(1, 1, 1e-6);
+    shape_add_box(mesh, 2, 0, 0, 3, 1, 1, false);
+    const uint32_t a = shape_vertex(mesh, 4, 0, 0), b = shape_vertex(mesh, 5, 0, 0), c = shape_vertex(mesh, 5, 1, 0);
+    shape_triangle(mesh, a, b, c);
+    mesh->sheet_triangle_count = mesh->triangle_count;
+    mesh->flap_triangle_count = (size_t)flaps;
+    mesh->sheet_thickness = 1e-3;
+    check_solid(mesh, flaps ? 2 : 3, 0, 1);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_small_complexes_by_hand),
@@ -348,6 +363,7 @@ int main(void) {
       cmocka_unit_test(test_boxes_that_meet_in_a_corner_are_apart),
       cmocka_unit_test(test_nothing_is_said_of_open_and_branching_surfaces),
       cmocka_unit_test(test_flat_shells_of_sheets_enclose_no_void),
+      cmocka_unit_test(test_flat_shells_beside_open_sheets_enclose_no_void),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
