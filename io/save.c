@@ -80,10 +80,7 @@ static int make_unnamed(const char *folder, size_t folder_length) {
   if (access("/proc/self/fd", X_OK) != 0) return -1;
   char *path = join(folder, folder_length, ".");
   const int file = path ? open(path, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666) : -1;
-  if (!path) errno = ENOMEM;
-  const int number = errno;
   qmat_free(path);
-  errno = number;
   return file;
 }
 
@@ -114,14 +111,11 @@ static int make_temporary(const char *folder, size_t folder_length, int unnamed,
   return -1;
 }
 
-static qmat_status write_part(qmat_context *context, const qmat_file_part *bytes, const char *folder,
-                              size_t folder_length, saved_part *part) {
+/* Fills a new file, which it closes. An `is_unnamed` one then gets a temporary name, if the file system gives it one.
+ */
+static qmat_status fill(qmat_context *context, const qmat_file_part *bytes, const char *folder, size_t folder_length,
+                        int file, bool is_unnamed, saved_part *part) {
   qmat_status status = QMAT_OK;
-  int file = make_unnamed(folder, folder_length);
-  const bool is_unnamed = file >= 0;
-  if (!is_unnamed && errno != ENOMEM) file = make_temporary(folder, folder_length, -1, &part->temporary);
-  if (file < 0) return qmat_fail_io(context, part->final, "cannot write the file", errno);
-
   struct stat about;
   if (part->replaces && stat(part->final, &about) == 0 && fchmod(file, about.st_mode & 0777) != 0)
     status = qmat_fail_io(context, part->final, "cannot copy the old file's permissions", errno);
@@ -136,11 +130,22 @@ static qmat_status write_part(qmat_context *context, const qmat_file_part *bytes
   }
   if (status == QMAT_OK && fsync(file) != 0 && errno != EINVAL)
     status = qmat_fail_io(context, part->final, "cannot write the file", errno);
-  if (status == QMAT_OK && is_unnamed && make_temporary(folder, folder_length, file, &part->temporary) < 0)
-    status = qmat_fail_io(context, part->final, "cannot write the file", errno);
+  if (status == QMAT_OK && is_unnamed) make_temporary(folder, folder_length, file, &part->temporary);
   if (close(file) != 0 && status == QMAT_OK)
     status = qmat_fail_io(context, part->final, "cannot write the file", errno);
   return status;
+}
+
+static qmat_status write_part(qmat_context *context, const qmat_file_part *bytes, const char *folder,
+                              size_t folder_length, saved_part *part) {
+  int file = make_unnamed(folder, folder_length);
+  if (file >= 0) {
+    const qmat_status status = fill(context, bytes, folder, folder_length, file, true, part);
+    if (status != QMAT_OK || part->temporary) return status;
+  }
+  file = make_temporary(folder, folder_length, -1, &part->temporary);
+  if (file < 0) return qmat_fail_io(context, part->final, "cannot write the file", errno);
+  return fill(context, bytes, folder, folder_length, file, false, part);
 }
 
 /* Makes the renames durable. Some file systems cannot flush a folder; the files are complete anyway. */
