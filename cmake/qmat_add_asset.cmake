@@ -9,9 +9,10 @@
 # first. The ending of OUTPUT chooses the format. A relative OUTPUT is in the current build folder; other relative paths
 # are in the current source folder. TARGET is the target that needs the asset; a new one is made and built by default.
 # SIDE_OUTPUTS are the files that the asset refers to, beside OUTPUT, as the .bin of a .gltf: other rules may depend on
-# them, the target clean deletes them, and Ninja makes the asset anew where one is missing. INPUT_NAME is the graph's
-# input that takes the model. OUTPUT_NAME is the output to save; it may be left out if there is only one. ${qmat_GRAPH}
-# is the file of qmat_plus.
+# them, the target clean deletes them, and Ninja makes the asset anew where one is missing. A file that OPTIONS saves, as
+# --output=report=FILE does, has to be one of them. Outputs with a path in the graph are not saved there: all assets of
+# one graph would write the same file, into the sources. INPUT_NAME is the graph's input that takes the model.
+# OUTPUT_NAME is the output to save; it may be left out if there is only one. ${qmat_GRAPH} is the file of qmat_plus.
 function(qmat_add_asset)
   cmake_parse_arguments(PARSE_ARGV 0 asset "" "TARGET;GRAPH;INPUT;OUTPUT;INPUT_NAME;OUTPUT_NAME"
     "SET;OPTIONS;SIDE_OUTPUTS")
@@ -55,7 +56,7 @@ function(qmat_add_asset)
   endif()
   add_custom_command(OUTPUT ${asset_OUTPUT} ${sides}
     COMMAND qmat::program run --quiet --set=${asset_INPUT_NAME}=${asset_INPUT} ${asset_SET} --output=${output}
-      --depfile=${asset_OUTPUT}.d ${asset_OPTIONS} -- ${asset_GRAPH}
+      --no-paths --depfile=${asset_OUTPUT}.d ${asset_OPTIONS} -- ${asset_GRAPH}
     DEPENDS ${graph_file} ${asset_INPUT} $<TARGET_FILE:qmat::program>
     DEPFILE ${asset_OUTPUT}.d
     COMMENT "Making ${file}" VERBATIM)

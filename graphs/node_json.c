@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/json_text.h"
+
 static const char *type_name(qmat_param_type type) {
   static const char *const names[] = {
       [QMAT_PARAM_BOOL] = "bool", [QMAT_PARAM_INT] = "int",       [QMAT_PARAM_FLOAT] = "float",
@@ -121,10 +123,11 @@ json_t *qmat_graph_json(const qmat_graph *graph) {
   for (size_t i = 0; i < graph->output_count; i++) {
     const qmat_graph_output *output = &graph->outputs[i];
     const qmat_graph_node *node = &graph->nodes[output->node];
-    json_array_append_new(outputs, json_pack("{s:s, s:s++, s:s, s:b}", "name", output->name, "port", node->id, ".",
+    json_array_append_new(outputs, json_pack("{s:s, s:s++, s:s, s:b, s:o}", "name", output->name, "port", node->id, ".",
                                              node->type->outputs[output->port].name, "type",
                                              qmat_value_type_name(qmat_graph_output_type(graph, i)), "on_request",
-                                             qmat_graph_on_request(graph, i)));
+                                             qmat_graph_on_request(graph, i), "path",
+                                             output->path ? qmat_json_string(output->path) : json_null()));
   }
   return json_pack("{s:o, s:o, s:o}", "inputs", inputs, "nodes", nodes, "outputs", outputs);
 }

@@ -18,6 +18,7 @@
 #include "graphs/node_json.h"
 #include "graphs/run/graph_run.h"
 #include "graphs/run/run_outputs.h"
+#include "graphs/run/run_paths.h"
 #include "graphs/run/run_plan.h"
 #include "graphs/run/run_report.h"
 #include "io/soup.h"
@@ -384,10 +385,16 @@ qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path) {
   if (!job->loaded) return job->problem.result;
   job_save save = {0};
   int choice;
-  qmat_status status = expect_given(&job->context, path, "the path");
+  qmat_status status = output ? QMAT_OK : expect_given(&job->context, path, "the path");
   if (status == QMAT_OK)
     status = output ? qmat_graph_find_output(&job->context, &job->graph, output, &save.output)
                     : only_file(job, path, &save.output);
+  if (status == QMAT_OK && !path) {
+    path = job->graph.outputs[save.output].path;
+    if (!path)
+      status = qmat_fail(&job->context, QMAT_ERROR_USAGE, "the path is NULL, and the graph gives output '%s' none",
+                         qmat_show(output).text);
+  }
   if (status == QMAT_OK) status = qmat_graph_output_format(&job->context, &job->graph, save.output, path, &choice);
   for (size_t i = 0; i < job->save_count && status == QMAT_OK; i++) {
     if (strcmp(job->saves[i].path, path) != 0) continue;
@@ -482,6 +489,8 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
   qmat_status status = QMAT_OK;
   if (job->cache_folder)
     status = qmat_cache_open(context, &(qmat_cache_options){.folder = job->cache_folder}, &job->cache);
+  for (size_t i = 0; i < job->save_count && status == QMAT_OK; i++)
+    status = qmat_make_folders(context, job->saves[i].path);
   if (status == QMAT_OK) status = qmat_run_plan(context, &job->graph, &options, &job->run);
   if (status == QMAT_OK) status = qmat_run_execute(context, &job->run, NULL);
   if (status == QMAT_OK) status = qmat_run_make_files(context, &job->run);

@@ -96,18 +96,19 @@ QMAT_API qmat_result qmat_job_give_medial(qmat_job *job, const char *port, const
 QMAT_API qmat_result qmat_job_give_result(qmat_job *job, const char *port, const qmat_job *from, const char *from_port);
 
 /* Requests the value of an output port ("simple.medial"), to be read after the run. With requests, only the nodes that
- * they and the saved outputs need run; without, every output of the graph is made. */
+ * they and the outputs of qmat_job_save need run, and nothing is saved at the paths that the graph gives to its
+ * outputs; without, every output of the graph is made, and saved where it has a path. */
 QMAT_API qmat_result qmat_job_want(qmat_job *job, const char *port);
 
 /* The graph's inputs, nodes and outputs as JSON: {"inputs": ["model"], "nodes": [{"id", "type", "outputs": {"mesh":
- * "mesh"}}], "outputs": [{"name", "port", "type", "on_request"}]}: on_request, it is made only where a run saves
- * it. Free with qmat_text_free. */
+ * "mesh"}}], "outputs": [{"name", "port", "type", "on_request", "path"}]}: on_request, it is made only where a run
+ * saves it; path, where the graph saves it, or null. Free with qmat_text_free. */
 QMAT_API qmat_result qmat_job_graph(qmat_job *job, char **json);
 
 /* Saves an output of the graph ("asset"; NULL: the one that alone has the ending of `path`, else the only one that
- * every run makes) as `path` after a successful run. The path's ending chooses the format. An output may be saved
- * several times under different paths. They hold for every later run. A path that is given again replaces the earlier
- * one. */
+ * every run makes) as `path` (NULL, with an output: the path that the graph gives it) after a successful run. Missing
+ * folders are made. The path's ending chooses the format. An output may be saved several times under different paths.
+ * They hold for every later run. A path that is given again replaces the earlier one. */
 QMAT_API qmat_result qmat_job_save(qmat_job *job, const char *output, const char *path);
 
 /* Forgets what was given, requested and saved, for a run with other models or paths. Parameters and the cache stay, and

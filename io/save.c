@@ -74,17 +74,33 @@ static qmat_status make_folders(qmat_context *context, const char *final, size_t
   return status;
 }
 
-/* Makes a new file in the target's folder. mkstemp would make it readable by its owner only. */
-static int make_temporary(const char *folder, size_t folder_length, char **path) {
+/* Makes a new file without a name in the target's folder: it is gone when the process is killed. -1: some file systems
+ * cannot, and without /proc it would get no name. */
+static int make_unnamed(const char *folder, size_t folder_length) {
+  if (access("/proc/self/fd", X_OK) != 0) return -1;
+  char *path = join(folder, folder_length, ".");
+  const int file = path ? open(path, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666) : -1;
+  qmat_free(path);
+  return file;
+}
+
+/* Makes a new file in the target's folder, or gives the file `unnamed` (-1: none) a name there. mkstemp would make it
+ * readable by its owner only. */
+static int make_temporary(const char *folder, size_t folder_length, int unnamed, char **path) {
   for (unsigned attempt = 0; attempt < 10000; attempt++) {
-    char name[64];
+    char name[64], handle[64];
+    snprintf(handle, sizeof handle, "/proc/self/fd/%d", unnamed);
     snprintf(name, sizeof name, ".qmat-%ld-%u.tmp", (long)getpid(), attempt);
     *path = join(folder, folder_length, name);
     if (!*path) {
       errno = ENOMEM;
       return -1;
     }
-    int file = open(*path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    int file = unnamed;
+    if (unnamed < 0)
+      file = open(*path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    else if (linkat(AT_FDCWD, handle, AT_FDCWD, *path, AT_SYMLINK_FOLLOW) != 0)
+      file = -1;
     if (file >= 0) return file;
     int number = errno;
     qmat_free(*path);
@@ -95,12 +111,11 @@ static int make_temporary(const char *folder, size_t folder_length, char **path)
   return -1;
 }
 
-static qmat_status write_part(qmat_context *context, const qmat_file_part *bytes, const char *folder,
-                              size_t folder_length, saved_part *part) {
+/* Fills a new file, which it closes. An `is_unnamed` one then gets a temporary name, if the file system gives it one.
+ */
+static qmat_status fill(qmat_context *context, const qmat_file_part *bytes, const char *folder, size_t folder_length,
+                        int file, bool is_unnamed, saved_part *part) {
   qmat_status status = QMAT_OK;
-  int file = make_temporary(folder, folder_length, &part->temporary);
-  if (file < 0) return qmat_fail_io(context, part->final, "cannot write the file", errno);
-
   struct stat about;
   if (part->replaces && stat(part->final, &about) == 0 && fchmod(file, about.st_mode & 0777) != 0)
     status = qmat_fail_io(context, part->final, "cannot copy the old file's permissions", errno);
@@ -115,9 +130,22 @@ static qmat_status write_part(qmat_context *context, const qmat_file_part *bytes
   }
   if (status == QMAT_OK && fsync(file) != 0 && errno != EINVAL)
     status = qmat_fail_io(context, part->final, "cannot write the file", errno);
+  if (status == QMAT_OK && is_unnamed) make_temporary(folder, folder_length, file, &part->temporary);
   if (close(file) != 0 && status == QMAT_OK)
     status = qmat_fail_io(context, part->final, "cannot write the file", errno);
   return status;
+}
+
+static qmat_status write_part(qmat_context *context, const qmat_file_part *bytes, const char *folder,
+                              size_t folder_length, saved_part *part) {
+  int file = make_unnamed(folder, folder_length);
+  if (file >= 0) {
+    const qmat_status status = fill(context, bytes, folder, folder_length, file, true, part);
+    if (status != QMAT_OK || part->temporary) return status;
+  }
+  file = make_temporary(folder, folder_length, -1, &part->temporary);
+  if (file < 0) return qmat_fail_io(context, part->final, "cannot write the file", errno);
+  return fill(context, bytes, folder, folder_length, file, false, part);
 }
 
 /* Makes the renames durable. Some file systems cannot flush a folder; the files are complete anyway. */

@@ -135,6 +135,14 @@ def _text(pointer):
     return _ffi.string(pointer).decode("utf-8", "replace")
 
 
+def _bytes(text, encode=str.encode):
+    """The text for a call of the library, which would take a NUL for its end. Paths: os.fsencode."""
+    encoded = encode(text)
+    if b"\0" in encoded:
+        raise ValueError("embedded null byte")
+    return encoded
+
+
 def _json(pointer):
     """The object of a JSON text that the library made, which is freed."""
     if not pointer:
@@ -232,14 +240,14 @@ class _Job:
 
     def value(self, port):
         view = _ffi.new("qmat_value_view *")
-        self.call(_lib.qmat_job_value, port.encode(), view)
+        self.call(_lib.qmat_job_value, _bytes(port), view)
         return view
 
     def arrays(self, port, count):
         """Copies of the tables of numbers of a value, by name."""
         found, view = {}, _ffi.new("qmat_array_view *")
         for i in range(count):
-            self.call(_lib.qmat_job_array, port.encode(), i, view)
+            self.call(_lib.qmat_job_array, _bytes(port), i, view)
             pointer, kind = (view.numbers, np.float64) if view.numbers else (view.ids, np.uint32)
             size = view.rows * view.columns
             flat = np.empty(0, kind)
@@ -250,11 +258,11 @@ class _Job:
 
     def file(self, port):
         view = _ffi.new("qmat_file_view *")
-        self.call(_lib.qmat_job_file, port.encode(), view)
+        self.call(_lib.qmat_job_file, _bytes(port), view)
         name, data, size = _ffi.new("const char **"), _ffi.new("const uint8_t **"), _ffi.new("size_t *")
         parts = {}
         for i in range(view.part_count):
-            self.call(_lib.qmat_job_file_part, port.encode(), i, name, data, size)
+            self.call(_lib.qmat_job_file_part, _bytes(port), i, name, data, size)
             parts[_text(name[0])] = bytes(_ffi.buffer(data[0], size[0]))
         return _text(view.format), parts
 
@@ -322,7 +330,7 @@ class Medial(Value):
         where the envelope lacks volume, negative where it has too much. Inside, the depth is at least as large."""
         points = _table(points, 3, np.float64, "points")
         distances = np.empty(len(points))
-        self._job.call(_lib.qmat_job_distances, self._port.encode(), _pointer(points), len(points), _pointer(distances))
+        self._job.call(_lib.qmat_job_distances, _bytes(self._port), _pointer(points), len(points), _pointer(distances))
         return distances
 
 
@@ -375,7 +383,7 @@ class Report(dict):
     """A report: counts and errors by name, in shares of the diagonal."""
 
     def __init__(self, job, port):
-        super().__init__(job.json(_lib.qmat_job_report, port.encode()))
+        super().__init__(job.json(_lib.qmat_job_report, _bytes(port)))
         self._job, self._port = job, port
 
 
@@ -440,7 +448,8 @@ def _assignment(name, value):
         value = "true" if value else "false"
     elif isinstance(value, (float, np.floating)):
         value = repr(float(value))
-    return os.fsencode(f"{name}=") + os.fsencode(value if isinstance(value, (str, bytes, os.PathLike)) else str(value))
+    value = value if isinstance(value, (str, bytes, os.PathLike)) else str(value)
+    return _bytes(f"{name}=", os.fsencode) + _bytes(value, os.fsencode)
 
 
 class Graph:
@@ -457,7 +466,7 @@ class Graph:
         if path is not None and text is not None:
             raise TypeError("a graph is a path or a text, not both")
         if path is not None:
-            self._make = (_lib.qmat_job_new_from_file, os.fsencode(path))
+            self._make = (_lib.qmat_job_new_from_file, _bytes(path, os.fsencode))
         elif text is not None:
             self._make = (_lib.qmat_job_new_from_text, text.encode(), len(text.encode()))
         else:
@@ -466,7 +475,7 @@ class Graph:
         self._job = _Job(*self._make)
         described = self._job.json(_lib.qmat_job_graph)
         if path is not None and os.path.exists(path):  # runs find it and what it names from any working folder
-            self._make = (_lib.qmat_job_new_from_file, os.path.join(os.getcwdb(), os.fsencode(path)))
+            self._make = (_lib.qmat_job_new_from_file, os.path.join(os.getcwdb(), self._make[1]))
             self._job = None
         self.inputs = described["inputs"]
         self.outputs = {output["name"]: output["port"] for output in described["outputs"]}
@@ -478,7 +487,7 @@ class Graph:
             cache = _ffi.string(folder) if folder else None
             _lib.qmat_text_free(folder)
         if cache:
-            self._call("cache", _lib.qmat_job_cache, os.fsencode(cache))
+            self._call("cache", _lib.qmat_job_cache, _bytes(cache, os.fsencode))
 
     def _current(self):
         """The job of the next run."""
@@ -505,9 +514,9 @@ class Graph:
         """Gives the value of an output port, whose node then does not run: a result of any run, also that of a scene
         with several meshes, or arrays V, F of a mesh, or spheres, cones, slabs of a medial mesh. `name` is that of the mesh.
         Returns the graph."""
-        place, what = port.encode(), ("give", port)
+        place, what = _bytes(port), ("give", port)
         if isinstance(value, (Value, Report, Items)):
-            self._call(what, _lib.qmat_job_give_result, place, value._job.job, value._port.encode(), alive=value)
+            self._call(what, _lib.qmat_job_give_result, place, value._job.job, _bytes(value._port), alive=value)
         elif port not in self.ports:
             self._current().call(_lib.qmat_job_want, place)  # says which port is meant
         elif self.ports[port] == "medial":
@@ -521,14 +530,14 @@ class Graph:
                 raise TypeError(f"{port}: a mesh is given as two arrays, V and F")
             positions = _own_table(value, 3, np.float64, "V")
             triangles = _own_table(more[0], 3, np.uint32, "F")
-            title = name.encode() if name else _ffi.NULL
+            title = _bytes(name) if name else _ffi.NULL
             self._call(what, _lib.qmat_job_give_mesh, place, title, _pointer(positions), len(positions), _pointer(triangles),
                        len(triangles), alive=(positions, triangles, title))
         return self
 
     def run(self, *want, save=None, threads=0, progress=None):
         """Runs what these ports or outputs need; without any, the outputs that every run makes. Returns
-        their Results.
+        their Results. Without any, outputs with a path in the graph are saved there, too.
 
         `save`: paths by output, or one path, or a list: the ending chooses the output. `threads` 0: one per processor.
         `progress(node, done, total, unit)` is called while nodes run. It cancels by raising, or by returning any false
@@ -540,9 +549,13 @@ class Graph:
         job, self._job = self._current(), None
         for output, paths in saves.items():
             for path in paths if isinstance(paths, (list, tuple)) else [paths]:
-                job.call(_lib.qmat_job_save, output.encode() if output else _ffi.NULL, os.fsencode(path))
+                job.call(_lib.qmat_job_save, _bytes(output) if output else _ffi.NULL, _bytes(path, os.fsencode))
+        if names is self._made:  # requests alone save nothing
+            for output in job.json(_lib.qmat_job_graph)["outputs"]:
+                if output["path"] is not None:
+                    job.call(_lib.qmat_job_save, _bytes(output["name"]), _ffi.NULL)
         for port in ports.values():
-            job.call(_lib.qmat_job_want, port.encode())
+            job.call(_lib.qmat_job_want, _bytes(port))
         job.run(threads, progress)
         return Results(job, ports)
 

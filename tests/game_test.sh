@@ -32,13 +32,21 @@ qmat_add_asset(TARGET more INPUT models/crate.off OUTPUT one/same.ply SET epsilo
 qmat_add_asset(TARGET more INPUT models/roof.gltf GRAPH spheres OUTPUT two/same.ply SET epsilon=10%)
 qmat_add_asset(TARGET more INPUT models/crate.off OUTPUT one-same.ply SET epsilon=10%)
 qmat_add_asset(TARGET more INPUT models/roof.gltf OUTPUT sides/roof.gltf SIDE_OUTPUTS roof.bin SET epsilon=10%)
+qmat_add_asset(TARGET more INPUT models/crate.off GRAPH told.yaml OUTPUT_NAME asset OUTPUT told/crate.ma
+  OPTIONS --output=report=told/crate.json SIDE_OUTPUTS crate.json)
+qmat_add_asset(TARGET more INPUT models/roof.gltf GRAPH told.yaml OUTPUT_NAME asset OUTPUT told/roof.ma)
 END
+  # A graph that saves a report by itself: each asset would write the same one.
+  sed '/^outputs:/,$d' game/spheres.yaml >game/told.yaml
+  echo 'outputs: { asset: asset.file, report: { from: simple.report, path: told.json } }' >>game/told.yaml
   cmake build >out.txt 2>&1 || die "$generator: more assets"
   make_assets
   [ "$made" = "crate.ma roof.ma " ] || die "$generator: the first build made '$made'"
   for file in one/same.ply two/same.ply one-same.ply sides/roof.gltf sides/roof.bin; do
     [ -s build/$file ] || die "$generator: $file is missing"
   done
+  [ -s build/told/crate.json ] || die "$generator: the report of one asset"
+  [ ! -e game/told.json ] || die "$generator: the sources have a new file"
   if [ "$generator" = Ninja ]; then
     rm build/sides/roof.bin
     make_assets
@@ -49,6 +57,7 @@ END
   grep -q '^crate: [1-9]' out.txt || die "$generator: the game has no colliders"
   make_assets
   [ -z "$made" ] || die "$generator: the second build made '$made'"
+  [ -z "$(find build/told -newer before)" ] || die "$generator: the second build made assets of the other graph"
   sed 's/^2 1 1$/2 1 1.1/' game/models/crate.off >edited.off
   cp edited.off game/models/crate.off
   make_assets

@@ -188,24 +188,6 @@ static qmat_status read_list(finder *f, const char *path) {
   return status;
 }
 
-/* Takes `.` and, with the folder before it, `..` out of a path. One of these at the start goes, too. */
-static void fold_dots(char *path) {
-  size_t length = 0;
-  for (const char *part = path; *part;) {
-    const size_t size = strcspn(part, "/"), with_slash = size + (part[size] == '/');
-    const bool is_up = size == 2 && memcmp(part, "..", 2) == 0;
-    if (is_up && length > 0) {
-      length--;
-      while (length > 0 && path[length - 1] != '/') length--;
-    } else if (!is_up && size > 0 && !(size == 1 && *part == '.')) {
-      memmove(path + length, part, with_slash);
-      length += with_slash;
-    }
-    part += with_slash;
-  }
-  path[length] = '\0';
-}
-
 /* Names the results of an asset: its path below the root, without the ending. */
 static qmat_status name_results(finder *f, qmat_asset *asset) {
   const char *path = without_dots(asset->input);
@@ -217,7 +199,7 @@ static qmat_status name_results(finder *f, qmat_asset *asset) {
   if (asset->stem) {
     memcpy(asset->stem, path, folder);
     memcpy(asset->stem + folder, name, length + 1);
-    fold_dots(asset->stem);
+    qmat_fold_dots(asset->stem);
     qmat_repair_utf8(asset->stem);
   }
   qmat_free(name);

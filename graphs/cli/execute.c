@@ -24,7 +24,8 @@ const qmat_option qmat_common_options[] = {
     {"report", 0, "FILE", "Write a report of the run, or of its error, as JSON"},
     {"force", 0, "[=NODE]", "Ignore cached results of all nodes, or of one; may be repeated"},
     {"dry-run", 0, NULL, "Print which nodes would run and which results are cached; run nothing"},
-    {"depfile", 0, "FILE", "Write the dependencies of the saved files as a rule for Make and Ninja"},
+    {"depfile", 0, "FILE",
+     "Write the dependencies of what -o names, else of what the graph saves, as a rule for Make and Ninja"},
     {"quiet", 'q', NULL, "Print nothing but what failed"},
     {"verbose", 'v', NULL, "Also print a table of the nodes: state, time and results"},
     {0},
@@ -34,6 +35,7 @@ const qmat_option qmat_output_options[] = {
     {"output", 'o', "[NAME=]PATH", "Save an output; the ending chooses the format; may be repeated"},
     {"format", 'f', "ENDING", "Format of an output that goes to the standard output, as in -o -"},
     {"jobs", 'j', "N", "Another name for --threads"},
+    {"no-paths", 0, NULL, "Save only what -o names, nothing at the paths that the graph gives"},
     {"to", 0, "NODE", "Run only this node and the nodes that it needs"},
     {0},
 };
@@ -85,6 +87,7 @@ static qmat_status prepare_save(qmat_context *context, qmat_invocation *invocati
 
 static qmat_status plan(qmat_context *context, qmat_invocation *invocation, bool foresee, qmat_planned_run *planned) {
   qmat_run_options options = {.saves = planned->saves,
+                              .no_paths = qmat_invocation_value(invocation, "no-paths") != NULL,
                               .foresee = foresee,
                               .to_node = qmat_invocation_value(invocation, "to"),
                               .cache = planned->cached ? &planned->cache : NULL,
@@ -251,6 +254,9 @@ static qmat_status prepare_later_files(qmat_context *context, const qmat_invocat
     qmat_fail(context, QMAT_ERROR_USAGE, "option '--depfile' needs an output that is saved to a file");
     status = qmat_fail_hint(context, "-o FILE");
   }
+  char names[512]; /* told after the run, with the names that only the run finds */
+  if (status == QMAT_OK && depfile)
+    status = qmat_run_check_depfile(context, run, invocation->streams.folder, names, sizeof names);
   if (status == QMAT_OK && report && depfile && qmat_same_file(depfile, report))
     status = qmat_fail(context, QMAT_ERROR_USAGE, "the depfile '%s' would overwrite the report", depfile);
   return status;

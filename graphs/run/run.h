@@ -77,6 +77,7 @@ typedef struct qmat_run_slot {
 typedef struct qmat_run_file {
   size_t output, slot;
   char *path;
+  bool by_graph;           /* the path is the graph's own: the caller named none for this output */
   size_t bytes;            /* of the main part */
   qmat_digest sha256;      /* of the main part's bytes */
   qmat_file *written;      /* the file to save, with its side files; NULL: not made yet */

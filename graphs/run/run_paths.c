@@ -29,31 +29,93 @@ static char *folder_of(const char *path) {
   return qmat_path_beside(path, qmat_folder_length(path) > 0 ? "" : ".");
 }
 
+void qmat_fold_dots(char *path) {
+  size_t length = 0;
+  for (const char *part = path; *part;) {
+    const size_t size = strcspn(part, "/"), with_slash = size + (part[size] == '/');
+    const bool is_up = size == 2 && memcmp(part, "..", 2) == 0;
+    if (is_up && length > 0) {
+      length--;
+      while (length > 0 && path[length - 1] != '/') length--;
+    } else if (!is_up && size > 0 && !(size == 1 && *part == '.')) {
+      memmove(path + length, part, with_slash);
+      length += with_slash;
+    }
+    part += with_slash;
+  }
+  path[length] = '\0';
+}
+
+/* The length of the deepest folder of a path that exists, with its slash; 0: the working folder. */
+static size_t existing_folder(char *path, struct stat *folder) {
+  for (size_t length = qmat_folder_length(path); length > 0;) {
+    const char kept = path[length];
+    path[length] = 0;
+    const bool exists = stat(path, folder) == 0;
+    path[length] = kept;
+    if (exists) return length;
+    for (length--; length > 0 && path[length - 1] != '/';) length--;
+  }
+  if (stat(".", folder) != 0) *folder = (struct stat){0};
+  return 0;
+}
+
 bool qmat_same_file(const char *a, const char *b) {
   struct stat first, second;
-  bool first_is = stat(a, &first) == 0, second_is = stat(b, &second) == 0;
+  const bool first_is = stat(a, &first) == 0, second_is = stat(b, &second) == 0;
   if (first_is && second_is) return first.st_dev == second.st_dev && first.st_ino == second.st_ino;
-  if (first_is != second_is || strcmp(a + qmat_folder_length(a), b + qmat_folder_length(b)) != 0) return false;
-  char *first_folder = folder_of(a), *second_folder = folder_of(b);
-  bool same = first_folder && second_folder && stat(first_folder, &first) == 0 && stat(second_folder, &second) == 0 &&
-              first.st_dev == second.st_dev && first.st_ino == second.st_ino;
-  qmat_free(first_folder);
-  qmat_free(second_folder);
+  if (first_is != second_is) return false;
+  char *first_path = qmat_strdup(a), *second_path = qmat_strdup(b);
+  bool same = first_path && second_path;
+  if (same) {
+    char *first_rest = first_path + existing_folder(first_path, &first);
+    char *second_rest = second_path + existing_folder(second_path, &second);
+    qmat_fold_dots(first_rest);
+    qmat_fold_dots(second_rest);
+    same = first.st_dev == second.st_dev && first.st_ino == second.st_ino && strcmp(first_rest, second_rest) == 0;
+  }
+  qmat_free(first_path);
+  qmat_free(second_path);
   return same;
 }
 
+/* Refuses a path that is a file which a node reads with these parameters. */
+static qmat_status check_not_read_by(qmat_context *context, const qmat_graph_node *node, const void *params,
+                                     const char *what, const char *path) {
+  for (size_t row = 0; row < qmat_param_count(node->type); row++) {
+    const char *input = qmat_param_input_file(node->type, row, params);
+    if (input && qmat_same_file(path, input))
+      return qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite the file that node '%s' reads", what, path,
+                       node->id);
+  }
+  return QMAT_OK;
+}
+
+static qmat_status check_not_graph(qmat_context *context, const qmat_graph *graph, const char *what, const char *path) {
+  if (!graph->is_file || !qmat_same_file(path, graph->file)) return QMAT_OK;
+  return qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite the graph file", what, path);
+}
+
 qmat_status qmat_run_check_not_input(qmat_context *context, const qmat_run *run, const char *what, const char *path) {
-  if (run->graph->is_file && qmat_same_file(path, run->graph->file))
-    return qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite the graph file", what, path);
-  for (size_t i = 0; i < run->step_count; i++) {
-    const qmat_graph_node *node = &run->graph->nodes[run->steps[i].node];
-    for (size_t row = 0; row < qmat_param_count(node->type); row++) {
-      const char *input = qmat_param_input_file(node->type, row, run->steps[i].params);
-      if (input && qmat_same_file(path, input)) {
-        return qmat_fail(context, QMAT_ERROR_USAGE, "%s '%s' would overwrite the file that node '%s' reads", what, path,
-                         node->id);
-      }
-    }
+  qmat_status status = check_not_graph(context, run->graph, what, path);
+  for (size_t i = 0; i < run->step_count && status == QMAT_OK; i++)
+    status = check_not_read_by(context, &run->graph->nodes[run->steps[i].node], run->steps[i].params, what, path);
+  return status;
+}
+
+qmat_status qmat_graph_check_paths(qmat_context *context, const qmat_graph *graph) {
+  for (size_t i = 0; i < graph->output_count; i++) {
+    const qmat_graph_output *output = &graph->outputs[i];
+    if (!output->path) continue;
+    char what[QMAT_GRAPH_NAME_SIZE + 16];
+    snprintf(what, sizeof what, "output '%s':", output->name);
+    qmat_status status = check_not_graph(context, graph, what, output->path);
+    for (size_t node = 0; node < graph->node_count && status == QMAT_OK; node++)
+      status = check_not_read_by(context, &graph->nodes[node], graph->nodes[node].params, what, output->path);
+    for (size_t k = 0; k < i && status == QMAT_OK; k++)
+      if (graph->outputs[k].path && qmat_same_file(output->path, graph->outputs[k].path))
+        status = qmat_fail(context, QMAT_ERROR_USAGE, "two outputs have the path '%s'", output->path);
+    if (status != QMAT_OK) return qmat_fail_at(context, graph->file, output->path_mark.line, output->path_mark.column);
   }
   return QMAT_OK;
 }

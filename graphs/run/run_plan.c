@@ -79,10 +79,11 @@ static qmat_status plan_files(run_planner *planner) {
         add_file(planner, options->saves[i].output, options->saves[i].path, &planner->formats[run->file_count]);
     if (status != QMAT_OK) return status;
   }
-  for (size_t i = 0; i < graph->output_count && !options->only_wanted; i++) {
+  for (size_t i = 0; i < graph->output_count && !options->only_wanted && !options->no_paths; i++) {
     const qmat_graph_output *output = &graph->outputs[i];
     if (!output->path || has_save(options, i) || !planner->within[output->node]) continue;
     qmat_status status = add_file(planner, i, output->path, &planner->formats[run->file_count]);
+    if (status == QMAT_OK) run->files[run->file_count - 1].by_graph = true;
     if (status != QMAT_OK)
       return qmat_fail_at(planner->context, graph->file, output->path_mark.line, output->path_mark.column);
   }
@@ -121,7 +122,7 @@ static qmat_status plan_needs(run_planner *planner) {
       if (strcmp(graph->nodes[i].id, options->to_node) == 0) planner->needed[i] = true;
   } else if (!options->only_wanted) {
     for (size_t i = 0; i < graph->output_count; i++) {
-      const bool saved = has_save(options, i) || graph->outputs[i].path;
+      const bool saved = has_save(options, i) || (graph->outputs[i].path && !options->no_paths);
       /* Where files are saved, these are all that is wanted of the graph's files. */
       const bool unwanted =
           qmat_graph_on_request(graph, i) || (options->save_count > 0 && qmat_graph_output_type(graph, i) == QMAT_FILE);

@@ -24,6 +24,7 @@ typedef struct qmat_run_options {
   const qmat_run_given *given;
   size_t given_count;
   bool only_wanted;     /* run only what `saves` and `wants` need; else every output of the graph is made */
+  bool no_paths;        /* save only `saves`; outputs with a path in the graph are made as those without one */
   bool foresee;         /* for qmat_run_foresee only: required parameters and output folders may be missing */
   const char *to_node;  /* run only this node and what it needs; NULL: the whole graph */
   qmat_cache *cache;    /* must outlive the run; NULL: none */

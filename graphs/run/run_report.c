@@ -244,13 +244,27 @@ static bool is_temporary(const char *path, const char *temporary) {
   return length > 0 && strncmp(path, temporary, length) == 0 && path[length] == '/';
 }
 
+/* Whether a saved file stands for the standard output. */
+static bool is_stream(const qmat_run_file *file, const char *temporary) {
+  return strcmp(file->path, "-") == 0 || is_temporary(file->path, temporary);
+}
+
+/* Whether a saved file is a target of the rule. Those that the graph saves by itself are none beside files that the
+ * caller names: a build's rule declares only these, and Ninja refuses a target that its rule does not declare. */
+static bool is_target(const qmat_run *run, const char *temporary, size_t index) {
+  if (is_stream(&run->files[index], temporary)) return false;
+  for (size_t i = 0; i < run->file_count && run->files[index].by_graph; i++)
+    if (!run->files[i].by_graph && !is_stream(&run->files[i], temporary)) return false;
+  return true;
+}
+
 /* The files of a rule in their order: `index` counts the saved ones first, then the graph file, then those that were
  * read. False at the end. `*path` is NULL for one that is left out. */
 static bool depfile_path(const qmat_run *run, const char *temporary, size_t index, const char **path, bool *saved) {
   *saved = index < run->file_count;
   *path = NULL;
   if (*saved) {
-    if (strcmp(run->files[index].path, "-") != 0) *path = run->files[index].path;
+    if (is_target(run, temporary, index)) *path = run->files[index].path;
   } else if (index == run->file_count) {
     if (run->graph->is_file) *path = run->graph->file;
   } else {
@@ -264,32 +278,48 @@ static bool depfile_path(const qmat_run *run, const char *temporary, size_t inde
 
 size_t qmat_run_count_saved(const qmat_run *run, const char *temporary) {
   size_t count = 0;
-  for (size_t i = 0; i < run->file_count; i++) count += !is_temporary(run->files[i].path, temporary);
+  for (size_t i = 0; i < run->file_count; i++) count += !is_stream(&run->files[i], temporary);
   return count;
+}
+
+/* Checks one name of a rule. The first name with a problem for one of the two programs makes the warning. */
+static qmat_status check_name(qmat_context *context, const char *path, bool is_target, char *warning, size_t size) {
+  if (strpbrk(path, ";|\t\n\r")) {
+    qmat_fail(context, QMAT_ERROR_USAGE, "neither Make nor Ninja can read the name '%s' in a depfile",
+              qmat_show(path).text);
+    return qmat_fail_hint(context, "give the file a name without ; | and control characters");
+  }
+  if (*warning) return QMAT_OK;
+  /* Ninja takes [ and ] as they are, and a backslash before them as part of the name. Make does too where no other file
+   * fits the pattern. The same backslash would hide a % from Make, and from Ninja the target. */
+  const char *problem = strpbrk(path, "=*?&<>\"'`^"), *words = NULL;
+  if (problem && *problem == '=')
+    words = "Make does not see when the file changes, because of the =";
+  else if (problem)
+    words = "Ninja makes the output at every build, because of the special character";
+  else if (is_target && strchr(path, '%'))
+    words = "Make takes it for a pattern, because of the %, and does not see when a file changes";
+  if (words) snprintf(warning, size, "the depfile has the name '%s': %s", qmat_show(path).text, words);
+  return QMAT_OK;
 }
 
 qmat_status qmat_run_check_depfile(qmat_context *context, const qmat_run *run, const char *temporary, char *warning,
                                    size_t size) {
   const char *path;
   bool saved;
+  qmat_status status = QMAT_OK;
   *warning = 0;
-  for (size_t i = 0; depfile_path(run, temporary, i, &path, &saved); i++) {
-    if (!path) continue;
-    const char *problem = strpbrk(path, ";|\t\n\r");
-    if (problem) {
-      qmat_fail(context, QMAT_ERROR_USAGE, "neither Make nor Ninja can read the name '%s' in a depfile",
-                qmat_show(path).text);
-      return qmat_fail_hint(context, "give the file a name without ; | and control characters");
+  for (size_t i = 0; status == QMAT_OK && depfile_path(run, temporary, i, &path, &saved); i++)
+    if (path) status = check_name(context, path, saved, warning, size);
+  /* What a planned run is going to read. */
+  for (size_t i = 0; i < run->step_count; i++) {
+    const qmat_node *type = run->graph->nodes[run->steps[i].node].type;
+    for (size_t row = 0; row < qmat_param_count(type) && status == QMAT_OK; row++) {
+      path = qmat_param_input_file(type, row, run->steps[i].params);
+      if (path && !is_temporary(path, temporary)) status = check_name(context, path, false, warning, size);
     }
-    /* Ninja takes [ and ] as they are, and a backslash before them as part of the name. Make does too where no other
-     * file fits the pattern. */
-    problem = strpbrk(path, "=*?&<>\"'`^");
-    if (problem && !*warning)
-      snprintf(warning, size, "the depfile has the name '%s': %s", qmat_show(path).text,
-               *problem == '=' ? "Make does not see when the file changes, because of the ="
-                               : "Ninja makes the output at every build, because of the special character");
   }
-  return QMAT_OK;
+  return status;
 }
 
 qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, const char *path,

@@ -17,13 +17,15 @@ json_t *qmat_run_report(const qmat_context *context, const qmat_run *run);
 json_t *qmat_run_warnings(const qmat_run *run, bool only_failures);
 
 /* Writes a rule for Make and Ninja: the saved files of a finished run depend on the graph file and on every file that
- * the run read, looked for and did not find, or that a cached result was made from. Each of these has an empty rule, so
+ * the run read, looked for and did not find, or that a cached result was made from. Where the caller names saved files,
+ * those that the graph saves by itself are left out. Each of these has an empty rule, so
  * that Make does not stop where it is missing. Files in the folder `temporary` (NULL or "": none) are left out: they
  * stand for the standard streams. Through a temporary. */
 qmat_status qmat_run_write_depfile(qmat_context *context, const qmat_run *run, const char *path, const char *temporary);
 
-/* Checks the names of those files. QMAT_ERROR_USAGE: neither Make nor Ninja can read one. `warning` says which name one
- * of the two cannot read; "": both read all. It is cut when `size` is short. */
+/* Checks the names of those files: before the run, of those that are known then. QMAT_ERROR_USAGE: neither Make nor
+ * Ninja can read one. `warning` says which name one of the two cannot read; "": both read all. It is cut when `size` is
+ * short. */
 qmat_status qmat_run_check_depfile(qmat_context *context, const qmat_run *run, const char *temporary, char *warning,
                                    size_t size);
 

@@ -219,6 +219,52 @@ static void test_a_job_forgets_models_and_paths(void **state) {
   qmat_job_free(job);
 }
 
+/* Requests save nothing at the graph's own path; a save without a path does, and makes the folder. */
+static void test_a_path_of_the_graph_is_saved_where_nothing_is_requested(void **state) {
+  (void)state;
+  char folder[] = "/tmp/qmat-job-XXXXXX", text[512], saved[64], below[64], *json;
+  assert_non_null(mkdtemp(folder));
+  snprintf(saved, sizeof saved, "%s/own/mesh.ply", folder);
+  snprintf(below, sizeof below, "%s/own", folder);
+  snprintf(text, sizeof text,
+           "qmat: 1\nnodes:\n  given: { type: medial.read }\n"
+           "  asset: { type: scene.write, in: { medial: given.medial } }\n"
+           "outputs: { asset: { from: asset.file, path: %s }, plain: asset.file }\n",
+           saved);
+  static const double ball[] = {0, 0, 0, 1};
+  qmat_job *job;
+  ok(job, qmat_job_new_from_text(&job, text, strlen(text)));
+  ok(job, qmat_job_graph(job, &json));
+  json_t *graph = json_loads(json, 0, NULL);
+  const json_t *outputs = json_object_get(graph, "outputs");
+  assert_string_equal(json_string_value(json_object_get(json_array_get(outputs, 0), "path")), saved);
+  assert_true(json_is_null(json_object_get(json_array_get(outputs, 1), "path")));
+  json_decref(graph);
+  qmat_text_free(json);
+  ok(job, qmat_job_give_medial(job, "given.medial", ball, 1, NULL, 0, NULL, 0));
+  ok(job, qmat_job_run(job, 1, NULL, NULL));
+  assert_int_equal(unlink(saved), 0);
+  assert_int_equal(rmdir(below), 0);
+  ok(job, qmat_job_want(job, "asset.file"));
+  ok(job, qmat_job_run(job, 1, NULL, NULL));
+  assert_int_equal(access(below, F_OK), -1);
+  assert_int_equal(qmat_job_save(job, "plain", NULL), QMAT_RESULT_USAGE);
+  assert_non_null(strstr(qmat_job_error(job)->text, "the graph gives output 'plain' none"));
+  ok(job, qmat_job_save(job, "asset", NULL));
+  ok(job, qmat_job_run(job, 1, NULL, NULL));
+  assert_int_equal(unlink(saved), 0);
+  qmat_job_forget(job);
+  ok(job, qmat_job_give_medial(job, "given.medial", ball, 1, NULL, 0, NULL, 0));
+  ok(job, qmat_job_want(job, "asset.file"));
+  snprintf(saved, sizeof saved, "%s/own/new/x.ma", folder);
+  ok(job, qmat_job_save(job, "plain", saved));
+  ok(job, qmat_job_run(job, 1, NULL, NULL));
+  assert_int_equal(unlink(saved), 0);
+  snprintf(saved, sizeof saved, "%s/own/new", folder);
+  assert_int_equal(rmdir(saved) + rmdir(below) + rmdir(folder), 0);
+  qmat_job_free(job);
+}
+
 /* Values of any type pass from job to job without a file. */
 static void test_values_are_given_read_and_passed_on(void **state) {
   (void)state;
@@ -600,6 +646,7 @@ int main(void) {
       cmocka_unit_test(test_the_saved_file_is_the_file_in_memory),
       cmocka_unit_test(test_the_progress_function_cancels_and_the_job_runs_again),
       cmocka_unit_test(test_a_job_forgets_models_and_paths),
+      cmocka_unit_test(test_a_path_of_the_graph_is_saved_where_nothing_is_requested),
       cmocka_unit_test(test_values_are_given_read_and_passed_on),
       cmocka_unit_test(test_items_of_a_list_are_read_one_by_one_and_one_that_failed_says_why),
       cmocka_unit_test(test_the_cache_folder_follows_the_environment),

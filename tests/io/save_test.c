@@ -2,9 +2,11 @@
 #include "io/save.h"
 
 #include <dirent.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 
 #include "tests/io/files.h"
 
@@ -231,6 +233,37 @@ static void test_a_full_disk_leaves_the_old_file_as_it_was(void **state) {
   assert_int_equal(rmdir(folder), 0);
 }
 
+/* Killed while it writes: here by the signal of a file that is too large. */
+static void test_a_killed_process_leaves_nothing_behind(void **state) {
+  (void)state;
+  char folder[64], path[96];
+  make_folder(folder);
+  const int unnamed = open(folder, O_WRONLY | O_TMPFILE, 0666);
+  if (unnamed < 0) {
+    rmdir(folder);
+    skip(); /* this file system has no files without names */
+  }
+  close(unnamed);
+  snprintf(path, sizeof path, "%s/x", folder);
+  qmat_context context = {0};
+  qmat_file *file = make_file("y", 100000);
+  const pid_t child = fork();
+  if (child == 0) {
+    const struct rlimit small = {.rlim_cur = 4096, .rlim_max = 4096}, no_core = {0};
+    signal(SIGXFSZ, SIG_DFL);
+    setrlimit(RLIMIT_CORE, &no_core);
+    setrlimit(RLIMIT_FSIZE, &small);
+    qmat_file_save(&context, file, path);
+    _exit(0);
+  }
+  int how;
+  assert_int_equal(waitpid(child, &how, 0), child);
+  assert_true(WIFSIGNALED(how));
+  assert_int_equal(count_entries(folder), 0);
+  qmat_value_release(&file->base);
+  assert_int_equal(rmdir(folder), 0);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_every_part_is_saved_and_permissions_stay),
@@ -240,6 +273,7 @@ int main(void) {
       cmocka_unit_test(test_a_failed_save_names_the_file_and_leaves_nothing_behind),
       cmocka_unit_test(test_the_main_part_appears_last),
       cmocka_unit_test(test_a_full_disk_leaves_the_old_file_as_it_was),
+      cmocka_unit_test(test_a_killed_process_leaves_nothing_behind),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -217,6 +217,27 @@ class OfFiles(InAFolder):
         self.assertEqual(list(graph.run()), ["asset"])
         self.assertFalse(os.path.exists("saved.ma"))
 
+    def test_a_run_without_names_saves_what_has_a_path_in_the_graph(self):
+        write_off("box.off", BOX_V, BOX_F)
+        Path("own.yaml").write_text("qmat: 1\nnodes:\n  model: { type: scene.read, params: { path: box.off } }\n"
+                                    "  solid: { type: mesh.solid, in: { mesh: model.mesh } }\n"
+                                    "outputs: { mesh: solid.mesh, report: { from: solid.report, path: own/report.json } }\n")
+        graph, report = qmat.Graph("own.yaml"), Path("own/report.json")
+        graph.run("report")
+        self.assertFalse(report.parent.exists())
+        found = graph.run()
+        self.assertEqual(list(found), ["mesh", "report"])
+        self.assertEqual(json.loads(report.read_text()).keys(), found["report"].keys())
+        report.unlink()
+        found = graph.run(save={"report": "new/folder/report.json"})
+        self.assertEqual((len(found), report.exists()), (0, False))
+        self.assertTrue(Path("new/folder/report.json").exists())
+
+    def test_folders_are_made(self):
+        m = qmat.mat(BOX_V, BOX_F, epsilon=.1)
+        m.save("new/folder/box.ma", "other/box.glb")
+        self.assertTrue(Path("new/folder/box.ma").exists() and Path("other/box.glb").exists())
+
     def test_a_graph_file_and_its_paths_are_found_from_any_folder(self):
         os.mkdir("sub")
         write_off("sub/box.off", BOX_V, BOX_F)
@@ -294,6 +315,22 @@ class Mistakes(InAFolder):
         with self.assertRaises(qmat.Error) as raised:
             qmat.mat(np.where(BOX_V == 2, np.nan, BOX_V), BOX_F)
         self.assertEqual((raised.exception.element_kind, raised.exception.element), ("vertex", 1))
+
+    def test_a_text_with_a_nul_reaches_nothing(self):
+        write_off("box.off", BOX_V, BOX_F)
+        graph = qmat.Graph().set(model="box.off", epsilon=.1)
+        for call in (lambda: qmat.mat("box.off\0x"), lambda: qmat.Graph("qmat_plus\0x"), lambda: qmat.Graph(cache=b"c\0x"),
+                     lambda: graph.set(epsilon="5%\0x"), lambda: graph.set({"epsilon=.2\0": 1}),
+                     lambda: graph.give("model.mesh\0x", BOX_V, BOX_F),
+                     lambda: graph.give("model.mesh", BOX_V, BOX_F, name="box\0x"), lambda: graph.run("solid.mesh\0x"),
+                     lambda: graph.run(save="a.ma\0x"), lambda: graph.run(save={"asset\0x": Path("a.ma")}),
+                     lambda: graph.run("solid.mesh")["solid.mesh[0]\0x"]):
+            with self.assertRaisesRegex(ValueError, "^embedded null byte$"):
+                call()
+        with self.assertRaises(ValueError):
+            qmat.Graph(text="qmat: 1\0\nnodes: {}")
+        self.assertEqual(os.listdir(), ["box.off"])
+        self.assertEqual(graph.run("errors.report")["errors.report"]["epsilon"], .1)
 
     def test_errors_survive_copies_and_pickles(self):
         for wrong in (lambda: qmat.mat(BOX_V, np.vstack([BOX_F, [[0, 1, 8]]])), lambda: qmat.Graph(text="qmat: 1\nnodes: 3"),

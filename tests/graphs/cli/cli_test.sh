@@ -165,6 +165,26 @@ expect 0 "spheres" "$qmat" mat list.gltf -o list.glb --epsilon 5% $coarse
 expect 0 "not refuted" "$qmat" info list.glb --against list.gltf
 holds "both errors are in their bounds" sh -c '! grep -q REFUTED out.txt'
 
+# Outputs of a graph that no run could save: one path twice, also below a folder that is missing, and a file that is read.
+cat >twice.yaml <<'END'
+qmat: 1
+nodes:
+  m: { type: medial.read, params: { path: ball.ma } }
+  w: { type: scene.write, in: { medial: m.medial } }
+outputs:
+  a: { from: w.file, path: later/x.ma }
+  b: { from: w.file, path: ./later/./y/../x.ma }
+END
+expect 2 "twice.yaml:7:28: two outputs have the path './later/./y/../x.ma'" "$qmat" check twice.yaml
+expect 2 "twice.yaml:7:28: two outputs have the path" "$qmat" run twice.yaml
+holds "the run makes no folder" test ! -e later
+expect 2 "two outputs have the path" "$qmat" mat box.off -o later/x.ma -o later//x.ma --dry-run
+sed 's,y/../x,z,' twice.yaml >once.yaml
+expect 0 "no mistakes" "$qmat" check once.yaml
+sed 's,./later/./y/../x,ball,' twice.yaml >read.yaml
+expect 2 "read.yaml:7:28: output 'b': 'ball.ma' would overwrite the file that node 'm' reads" "$qmat" check read.yaml
+rm twice.yaml once.yaml read.yaml
+
 # The path of an output in a graph gets its folder, too.
 printf 'qmat: 1\nnodes:\n  m: { type: medial.read, params: { path: ball.ma } }\n  w: { type: scene.write, in: { medial: m.medial } }
 outputs: { o: { from: w.file, path: made/by/graph.ma } }\n' >paths.yaml

@@ -135,9 +135,60 @@ for tool in make ninja; do
   holds "$tool: a changed model is seen" test odd.ma -nt again
 done
 
-# Names that one of the two cannot read are told; those that neither can are refused before anything is written.
+# A graph that saves a report by itself: the rule is for the file that -o names, and without -o for the report.
+cat >own.yaml <<'END'
+qmat: 1
+nodes:
+  model: { type: scene.read, params: { path: box.off } }
+  solid: { type: mesh.solid, in: { mesh: model.mesh } }
+  ball: { type: medial.read, params: { path: ball.ma } }
+  asset: { type: scene.write, in: { medial: ball.medial } }
+outputs: { asset: asset.file, report: { from: solid.report, path: own/report.json } }
+END
+printf '1 0 0\nv 0 0 0 1\n' >ball.ma
+cp "$work/box.off" edited.off
+for tool in make ninja; do
+  printf 'roof.ma:\n\t%s run own.yaml -o asset=roof.ma --quiet --depfile own.d\n-include own.d\n' "$qmat" >Makefile
+  printf 'rule own\n  command = %s run own.yaml -o asset=$out --quiet --depfile own.d\n  depfile = own.d\nbuild roof.ma: own\n' \
+    "$qmat" >build.ninja
+  rm -rf roof.ma own own.d
+  made yes "a graph with a path of its own"
+  made no "that graph, the second time"
+  holds "$tool: the report is saved, too" test -s own/report.json
+  cp edited.off box.off
+  made yes "an edited model of that graph"
+  made no "after it"
+done
+holds "the file that is named is the target" grep -q '^roof.ma: ' own.d
+expect 0 "" "$qmat" run own.yaml --quiet --depfile own.d
+holds "without a name, the report is" grep -q '^own/report.json: ' own.d
+expect 0 "" sh -c "$qmat run own.yaml -o asset=-.ma --quiet --depfile own.d >piped.ma"
+holds "the standard output is no name" grep -q '^own/report.json: ' own.d
+rm -r own own.d
+expect 0 "" "$qmat" run own.yaml --no-paths -o asset=roof.ma --quiet --depfile own.d
+holds "the report is left out" test ! -e own -a -s own.d
+expect 2 "needs an output that is saved to a file" "$qmat" run own.yaml --no-paths --quiet --depfile own.d
+rm Makefile build.ninja
+
+# A target that Make takes for a pattern is told; Ninja reads it. A model of such a name is no pattern.
+cp box.off 'a%b.off'
+expect 0 "Make takes it for a pattern" "$qmat" run own.yaml -o 'asset=a%b.ma' --depfile told.d
+expect 0 "" "$qmat" run own.yaml --set 'model.path=a%b.off' -o 'asset=told.ma' --depfile told.d
+holds "a model is not told" sh -c '! grep -q pattern err.txt'
+printf 'rule own\n  command = %s run own.yaml -o asset=$out --quiet --depfile own.d\n  depfile = own.d\nbuild a%%b.ma: own\n' \
+  "$qmat" >build.ninja
+expect 0 "" ninja
+expect 0 "no work to do" ninja
+rm build.ninja
+
+# Names that one of the two cannot read are told; those that neither can are refused before the run.
 cp box.off 'a=b.off'
 cp box.off 'a;b.off'
+expect 2 "neither Make nor Ninja can read the name 'a;b.off'" "$qmat" mat 'a;b.off' -o never.ma --depfile never.d \
+  --progress json
+holds "no node has started" sh -c '! grep -q start err.txt'
+expect 2 "the name 'c;d.ma'" "$qmat" mat box.off -o 'c;d.ma' --depfile never.d --dry-run
+expect 0 "" "$qmat" mat box.off -o 'c;d.ma' --epsilon 20% --set samples.spacing=20%
 expect 0 "Make does not see when the file changes" "$qmat" mat 'a=b.off' -o told.ma --epsilon 10% --depfile told.d
 expect 2 "neither Make nor Ninja can read the name 'a;b.off'" "$qmat" mat 'a;b.off' -o never.ma --depfile never.d
 holds "nothing is written" test ! -e never.ma -a ! -e never.d
