@@ -69,9 +69,13 @@ const qmat_node qmat_node_medial_lod = {
     .version = 4,
     .summary = "Extracts a medial mesh of any number of spheres or any error from a chain",
     .doc =
-        "Does the collapses of the chain down to the number of spheres, or while both errors are within epsilon at the "
-        "constraint points (2.5 % of it are a margin for the surface between them). With both parameters the first "
-        "limit that is reached ends it.\n\n"
+        "Does the collapses of the chain down to the number of spheres, or while the threshold of both errors is "
+        "within epsilon. With both parameters the first limit that is reached ends it.\n\n"
+        "The threshold holds at constraint points for what collapses change; 2.5 % of it are a margin for the surface "
+        "between them. It is no bound of the level's errors: where the initial medial mesh leaves the solid, or is "
+        "too far from the surface, no collapse repairs it, and the level may be several times epsilon away. "
+        "medial.evaluate says how far. medial.simplify with on_exceed=skip also fits and repairs spheres, and reaches "
+        "epsilon with fewer of them: graphs/lod.yaml does so for each level.\n\n"
         "The medial mesh and its responsible regions are, byte for byte, those that medial.simplify makes with the "
         "parameters of the chain and that bound. An epsilon below the chain's finest gives the initial medial mesh. "
         "The time is milliseconds and grows with the initial medial mesh.",

@@ -39,7 +39,8 @@ if [ $# -gt 0 ]; then mv "$work/wanted" "$work/mutants"; fi
 
 # find_text ROOT TEXT: sets file to the one file that holds the text, and count to how often it occurs.
 find_text() {
-  (cd "$1" && grep -rnF --include='*.[ch]' --include='*.cpp' -e "$2" core io nodes graphs) >"$work/found"
+  (cd "$1" && grep -rnF --include='*.[ch]' --include='*.cpp' --include='*.yaml' -e "$2" core io nodes graphs) \
+    >"$work/found"
   count=$(wc -l <"$work/found")
   file=$(cut -d : -f 1 "$work/found" | head -n 1)
 }
@@ -81,9 +82,9 @@ target_of() {
   echo "$target"
 }
 
-# build_and_run TEST: 0: the test passes; 1: it fails; 2: it cannot be built.
+# build_and_run TEST, which may need the generated models, too: 0: the test passes; 1: it fails; 2: it cannot be built.
 build_and_run() {
-  ninja -C "$tree/build/release" "$(target_of "$1")" >"$work/log" 2>&1 || return 2
+  ninja -C "$tree/build/release" "$(target_of "$1")" qmat_models >"$work/log" 2>&1 || return 2
   ctest --test-dir "$tree/build/release" -R "^$(echo "$1" | sed 's/\./\\./g')\$" --no-tests=error --timeout 600 \
     >"$work/log" 2>&1 || return 1
 }

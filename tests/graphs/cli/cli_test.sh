@@ -203,12 +203,13 @@ rm placed.gltf
 
 # Only the levels that are saved are made, and the summary is theirs.
 count_of() { head -n 1 "$1" | cut -d ' ' -f 1; }
-expect 0 "" "$qmat" run lod --set model=box.off --set near=1% --set far=20% $coarse -o near=near.ma -o far=far.ma
+coarse_levels="--set near_samples.spacing=10% --set far_samples.spacing=10%"
+expect 0 "" "$qmat" run lod --set model=box.off --set near=1% --set far=20% $coarse_levels -o near=near.ma -o far=far.ma
 holds "two levels" test "$(count_of near.ma)" -ne "$(count_of far.ma)"
 holds "a summary of each" test "$(grep -o '[0-9]* spheres* describe' out.txt | cut -d ' ' -f 1 | tr '\n' ' ')" = \
   "$(count_of near.ma) $(count_of far.ma) "
-expect 0 "box: $(count_of near.ma) spheres describe" "$qmat" run lod --set model=box.off --set near=1% --set far=20% $coarse \
-  -o near=near.ma --report one_level.json
+expect 0 "box: $(count_of near.ma) spheres describe" "$qmat" run lod --set model=box.off --set near=1% --set far=20% \
+  $coarse_levels -o near=near.ma --report one_level.json
 holds "only what that level needs" sh -c 'grep -q "\"near_errors\"" one_level.json && ! grep -q "\"far_errors\"" one_level.json'
 rm near.ma far.ma one_level.json
 

@@ -147,8 +147,8 @@ holds "the text of a graph" cmp out.txt "$source/graphs/lod.yaml"
 expect 2 "did you mean 'colliders'?" "$qmat" graphs collider
 expect 2 "'qmat graphs' lists the built-in ones" "$qmat" run qmat_plsu
 cp "$source/graphs/lod.yaml" qmat_plus
-expect 0 "qmat_plus: 20 nodes, 4 inputs, 3 outputs, no mistakes" "$qmat" check qmat_plus # the built-in graph has 15
-holds "a file comes before a built-in graph" sh -c '"$0" dot qmat_plus | grep -q medial.lod' "$qmat"
+expect 0 "qmat_plus: 34 nodes, 11 inputs, 3 outputs, no mistakes" "$qmat" check qmat_plus # the built-in graph has 15
+holds "a file comes before a built-in graph" sh -c '"$0" dot qmat_plus | grep -q far_refined' "$qmat"
 rm qmat_plus
 
 # The layout of graph files.
