@@ -11,6 +11,7 @@
  *     cas/DIGEST    a blob: the serialised form of a value, named by the digest of its bytes
  *     tmp/          files being written; their writers hold a lock on them
  *     bad/          damaged blobs and records, kept for inspection
+ *     size          about how many bytes there are (cache_size.h)
  *
  * A remote cache may hold the same files. Missing files are fetched from it into the folder; stored files go to both.
  *
@@ -33,11 +34,13 @@ typedef struct qmat_cache {
   char *folder; /* ends in '/' */
   bool read_only;
   uint64_t most_size;
-  uint64_t stored;      /* bytes added since it was opened */
-  bool ready;           /* its folders exist */
-  unsigned temporaries; /* how many were made */
-  char warning[384];    /* the first failure; "": none */
-  qmat_digest *bad;     /* damaged files that could not be moved to bad/ */
+  bool stored;            /* something was added since the last trim */
+  bool uncounted;         /* something was added that the file `size` does not count */
+  uint64_t counted_ahead; /* bytes that the file `size` counts and that are not stored yet */
+  bool ready;             /* its folders exist */
+  unsigned temporaries;   /* how many were made */
+  char warning[384];      /* the first failure; "": none */
+  qmat_digest *bad;       /* damaged files that could not be moved to bad/ */
   size_t bad_count, bad_capacity;
   qmat_remote_cache *remote; /* NULL: none */
 } qmat_cache;
@@ -46,7 +49,13 @@ typedef struct qmat_cache {
  * remote URL is not http or https. Free with qmat_cache_close, also after a failure. */
 qmat_status qmat_cache_open(qmat_context *context, const qmat_cache_options *options, qmat_cache *cache);
 
-/* Frees the cache; if anything was stored, deletes files above the size first. Works on a zeroed cache. */
+/* If anything was stored: deletes the least recently used files when the cache may be above its size, and sets the
+ * warning when some of them were used within the last day. A run calls it before it tells the warning. The folder is
+ * listed only when the file `size` says so, and by one process at a time. Processes that are still running may stand
+ * above the limit; where counts were lost, an eighth of it may be added. */
+void qmat_cache_trim(qmat_cache *cache);
+
+/* Trims the cache and frees it. Works on a zeroed cache. */
 void qmat_cache_close(qmat_cache *cache);
 
 /* The default folder: $XDG_CACHE_HOME/qmat, else ~/.cache/qmat. NULL when neither is an absolute path or memory is
@@ -107,7 +116,7 @@ typedef struct qmat_cache_entry {
 bool qmat_cache_list(const qmat_cache *cache, qmat_cache_entry **entries, size_t *count);
 
 typedef struct qmat_cache_sweep {
-  size_t deleted;
+  size_t deleted, recent; /* recent: of the least recently used, those that were used within the last day */
   uint64_t freed;
 } qmat_cache_sweep;
 
