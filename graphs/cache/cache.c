@@ -412,6 +412,16 @@ static bool list_kind(const qmat_cache *cache, qmat_cache_kind kind, entry_list 
   return done;
 }
 
+static int64_t now_nanoseconds(void) {
+  struct timespec time;
+  clock_gettime(CLOCK_REALTIME, &time);
+  return (int64_t)time.tv_sec * 1000000000 + time.tv_nsec;
+}
+
+static bool is_recent(const qmat_cache_entry *entry, int64_t now) {
+  return now - entry->used < (int64_t)24 * 3600 * 1000000000;
+}
+
 static int by_kind_and_name(const void *a, const void *b) {
   const qmat_cache_entry *first = a, *second = b;
   return first->kind != second->kind ? (first->kind > second->kind) - (first->kind < second->kind)
@@ -422,6 +432,25 @@ static int by_last_use(const void *a, const void *b) {
   const qmat_cache_entry *first = a, *second = b;
   return first->used != second->used ? (first->used > second->used) - (first->used < second->used)
                                      : by_kind_and_name(a, b);
+}
+
+/* The order of chance: by a hash of the last use to 2 s, so that the record of a result and its blobs stay together. */
+static int by_chance(const void *a, const void *b) {
+  const qmat_cache_entry *first = a, *second = b;
+  const uint64_t factor = 0x9e3779b97f4a7c15u, x = (uint64_t)(first->used >> 31) * factor,
+                 y = (uint64_t)(second->used >> 31) * factor;
+  return x != y ? (x > y) - (x < y) : by_last_use(a, b);
+}
+
+/* Sorts entries by how little they are worth keeping: by their last use. Of the last day, the older half is in an order
+ * of chance: work in the same order each day that does not fit would find nothing again, as each result would be
+ * deleted just before its turn. */
+static void sort_victims(qmat_cache_entry *entries, size_t count, int64_t now) {
+  size_t old = 0;
+  if (count == 0) return;
+  qsort(entries, count, sizeof *entries, by_last_use);
+  while (old < count && !is_recent(&entries[old], now)) old++;
+  if (count - old > 1) qsort(entries + old, (count - old) / 2, sizeof *entries, by_chance);
 }
 
 bool qmat_cache_list(const qmat_cache *cache, qmat_cache_entry **entries, size_t *count) {
@@ -456,12 +485,6 @@ static bool is_abandoned(const qmat_cache *cache, const qmat_cache_entry *entry)
   if (file >= 0) close(file);
   qmat_free(path);
   return abandoned;
-}
-
-static int64_t now_nanoseconds(void) {
-  struct timespec time;
-  clock_gettime(CLOCK_REALTIME, &time);
-  return (int64_t)time.tv_sec * 1000000000 + time.tv_nsec;
 }
 
 /* The entry of a blob in a sorted list, or NULL. */
@@ -513,7 +536,7 @@ qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool 
   qmat_cache_sweep sweep = {0};
   if (cache->read_only) return sweep;
   entry_list list = {0};
-  const int64_t day = (int64_t)24 * 3600 * 1000000000, now = now_nanoseconds();
+  const int64_t now = now_nanoseconds();
   const uint64_t counted = qmat_cache_counted(cache);
   if (most_size == UINT64_MAX && !thorough) {
     list_kind(cache, QMAT_CACHE_TEMPORARY, &list);
@@ -534,14 +557,14 @@ qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool 
   if (total > most_size) {
     /* A tenth below the limit, so that the next run need not delete again. */
     uint64_t wanted = most_size - most_size / 10;
-    qsort(list.entries, list.count, sizeof *list.entries, by_last_use);
+    sort_victims(list.entries, list.count, now);
     for (size_t i = 0; i < list.count && total > wanted; i++) {
       const qmat_cache_entry *entry = &list.entries[i];
       if (entry->kind > QMAT_CACHE_BLOB) continue;
       const size_t before = sweep.deleted;
       delete_entry(cache, entry, &sweep);
       total -= entry->size;
-      if (sweep.deleted > before && now - entry->used < day) sweep.recent++;
+      if (sweep.deleted > before && is_recent(entry, now)) sweep.recent++;
     }
   }
   if (most_size != UINT64_MAX || thorough) qmat_cache_note_size(cache, total, counted);

@@ -121,8 +121,8 @@ typedef struct qmat_cache_sweep {
 } qmat_cache_sweep;
 
 /* Deletes temporaries whose writers are gone, and the least recently used records and blobs until at most `most_size`
- * bytes remain. With `thorough` also damaged files, and records with a missing blob and unnamed blobs that are older
- * than an hour. */
+ * bytes remain; among the older half of those of the last day in an order of chance. With `thorough` also damaged
+ * files, and records with a missing blob and unnamed blobs that are older than an hour. */
 qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool thorough);
 
 /* Deletes every file of the cache, but no foreign file. */

@@ -1133,6 +1133,38 @@ static void test_what_was_used_least_recently_is_deleted_first(void **state) {
   qmat_cache_close(&cache);
 }
 
+static void test_work_that_does_not_fit_finds_a_part_of_it_again(void **state) {
+  fixture *f = *state;
+  enum { RESULTS = 20, PASSES = 10 };
+  qmat_context context = {0};
+  qmat_cache cache;
+  open_cache(f, &cache);
+  struct timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  size_t hits = 0, deleted = 0, recent = 0;
+  for (int turn = 0; turn < PASSES * RESULTS; turn++) {
+    bool added;
+    char path[256];
+    qmat_value *value;
+    test_ok(&context, test_report(&context, 10 + turn % RESULTS, &value));
+    json_t *stored = qmat_cache_put_value(&cache, value, &added);
+    hits += !added;
+    blob_path(f, 10 + turn % RESULTS, path);
+    const time_t used = now.tv_sec - 4 * (PASSES * RESULTS - turn);
+    const struct timespec times[2] = {{.tv_sec = used}, {.tv_sec = used}};
+    assert_int_equal(utimensat(AT_FDCWD, path, times, 0), 0);
+    const qmat_cache_sweep sweep = qmat_cache_collect(&cache, 16 * qmat_cache_stored_size(stored), false);
+    deleted += sweep.deleted;
+    recent += sweep.recent;
+    assert_true(qmat_cache_has_stored(&cache, stored)); /* what was just used stays */
+    json_decref(stored);
+    qmat_value_release(value);
+  }
+  assert_true(hits >= 20 && hits < 180);
+  assert_true(deleted > 0 && recent == deleted);
+  qmat_cache_close(&cache);
+}
+
 /* The file of how much the cache holds: its first line, and how many bytes follow. */
 static void read_size_file(const fixture *f, uint64_t *total, size_t *counted) {
   char path[128], bytes[4096];
@@ -1432,6 +1464,7 @@ int main(void) {
       CASE(test_why_names_the_version_of_a_library),
       CASE(test_why_names_the_format_of_keys),
       CASE(test_what_was_used_least_recently_is_deleted_first),
+      CASE(test_work_that_does_not_fit_finds_a_part_of_it_again),
       CASE(test_the_folder_is_listed_only_when_it_may_be_above_its_size),
       CASE(test_what_is_stored_is_counted_before_by_all_processes),
       CASE(test_one_process_sweeps_at_a_time),
