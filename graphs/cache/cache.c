@@ -146,10 +146,8 @@ static bool set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest
 static bool keep_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
                        size_t size) {
   char *path = qmat_cache_path_of_digest(cache, kind, digest);
-  bool kept = path && make_ready(cache);
+  bool kept = path && make_ready(cache) && qmat_cache_place_file(cache, path, bytes, size);
   if (kept) qmat_cache_count(cache, size);
-  kept = kept && qmat_cache_place_file(cache, path, bytes, size);
-  if (kept) cache->stored = true;
   qmat_free(path);
   return kept;
 }
@@ -537,7 +535,7 @@ qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool 
   if (cache->read_only) return sweep;
   entry_list list = {0};
   const int64_t now = now_nanoseconds();
-  const uint64_t counted = qmat_cache_counted(cache);
+  const uint64_t length = qmat_cache_size_length(cache);
   if (most_size == UINT64_MAX && !thorough) {
     list_kind(cache, QMAT_CACHE_TEMPORARY, &list);
   } else if (!qmat_cache_list(cache, &list.entries, &list.count)) {
@@ -567,7 +565,7 @@ qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool 
       if (sweep.deleted > before && is_recent(entry, now)) sweep.recent++;
     }
   }
-  if (most_size != UINT64_MAX || thorough) qmat_cache_note_size(cache, total, counted);
+  if (most_size != UINT64_MAX || thorough) qmat_cache_note_size(cache, total, length);
   qmat_free(list.entries);
   return sweep;
 }

@@ -26,7 +26,7 @@ static char *size_path(const qmat_cache *cache) {
 /* Opens the file; -1: it is missing, or memory is short. */
 static int open_size(const qmat_cache *cache, int flags) {
   char *path = size_path(cache);
-  const int file = path ? open(path, flags | O_CLOEXEC) : -1;
+  const int file = path ? open(path, flags | O_CLOEXEC, 0666) : -1;
   qmat_free(path);
   return file;
 }
@@ -45,12 +45,13 @@ static bool read_size(const qmat_cache *cache, uint64_t *total, uint64_t *counte
 }
 
 void qmat_cache_count(qmat_cache *cache, uint64_t bytes) {
+  cache->stored = true;
   if (bytes > cache->counted_ahead) {
     char dots[4096];
     uint64_t units = (bytes - cache->counted_ahead - 1) / unit + 1;
     cache->counted_ahead += units * unit;
     memset(dots, '.', sizeof dots);
-    const int file = open_size(cache, O_WRONLY | O_APPEND);
+    const int file = open_size(cache, O_WRONLY | O_APPEND | O_CREAT);
     for (size_t part; units > 0 && !cache->uncounted; units -= part) {
       part = units < sizeof dots ? (size_t)units : sizeof dots;
       cache->uncounted = file < 0 || write(file, dots, part) != (ssize_t)part;
@@ -68,15 +69,18 @@ bool qmat_cache_may_be_full(const qmat_cache *cache) {
          counted > cache->most_size / 8 / unit;
 }
 
-uint64_t qmat_cache_counted(const qmat_cache *cache) {
-  uint64_t total, counted;
-  return read_size(cache, &total, &counted) ? counted : 0;
+uint64_t qmat_cache_size_length(const qmat_cache *cache) {
+  struct stat about;
+  char *path = size_path(cache);
+  const bool there = path && stat(path, &about) == 0;
+  qmat_free(path);
+  return there ? (uint64_t)about.st_size : 0;
 }
 
-void qmat_cache_note_size(qmat_cache *cache, uint64_t total, uint64_t counted) {
+void qmat_cache_note_size(qmat_cache *cache, uint64_t total, uint64_t length) {
   char *path = size_path(cache);
-  const uint64_t now = qmat_cache_counted(cache), most = (uint64_t)1 << 24;
-  uint64_t since = now > counted ? now - counted : 0;
+  const uint64_t now = qmat_cache_size_length(cache), most = (uint64_t)1 << 24;
+  uint64_t since = now > length ? now - length : 0;
   if (since > most) since = most; /* 1 TB: a damaged file may be of any length */
   char *text = path && total > 0 ? qmat_alloc(LINE + (size_t)since + 1, 1) : NULL;
   if (text) {
