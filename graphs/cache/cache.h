@@ -3,11 +3,12 @@
 #define QMAT_GRAPHS_CACHE_CACHE_H
 
 #include "core/value.h"
-#include "graphs/cache/remote_cache.h"
+#include "graphs/cache/cache_files.h"
 
 /* A store of results, shared by any number of processes:
  *
- *     ac/KEY        a record: the node that ran, its readable key, and the digests of its outputs
+ *     ac/KEY        a record: the node that ran, its readable key, and the digests of its outputs; or the side files
+ *                   that every run of this key has read, whose digests lead to the next key
  *     cas/DIGEST    a blob: the serialised form of a value, named by the digest of its bytes
  *     tmp/          files being written; their writers hold a lock on them
  *     bad/          damaged blobs and records, kept for inspection
@@ -29,21 +30,6 @@ typedef struct qmat_cache_options {
 } qmat_cache_options;
 
 #define QMAT_CACHE_SIZE ((uint64_t)10000000000)
-
-typedef struct qmat_cache {
-  char *folder; /* ends in '/' */
-  bool read_only;
-  uint64_t most_size;
-  bool stored;            /* something was added since the last trim */
-  bool uncounted;         /* something was added that the file `size` does not count */
-  uint64_t counted_ahead; /* bytes that the file `size` counts and that are not stored yet */
-  bool ready;             /* its folders exist */
-  unsigned temporaries;   /* how many were made */
-  char warning[384];      /* the first failure; "": none */
-  qmat_digest *bad;       /* damaged files that could not be moved to bad/ */
-  size_t bad_count, bad_capacity;
-  qmat_remote_cache *remote; /* NULL: none */
-} qmat_cache;
 
 /* Opens the cache in a folder, which is made when something is stored. QMAT_ERROR_USAGE: the path is a file, or the
  * remote URL is not http or https. Free with qmat_cache_close, also after a failure. */
@@ -93,14 +79,6 @@ uint64_t qmat_cache_stored_size(const json_t *stored);
 bool qmat_cache_put_record(qmat_cache *cache, const qmat_digest *key, const json_t *record);
 
 /* ---- maintenance ---- */
-
-typedef enum qmat_cache_kind {
-  QMAT_CACHE_RECORD,
-  QMAT_CACHE_BLOB,
-  QMAT_CACHE_TEMPORARY,
-  QMAT_CACHE_BAD,
-  QMAT_CACHE_KIND_COUNT
-} qmat_cache_kind;
 
 /* A file of the cache. */
 typedef struct qmat_cache_entry {

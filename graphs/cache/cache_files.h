@@ -2,9 +2,33 @@
 #ifndef QMAT_GRAPHS_CACHE_CACHE_FILES_H
 #define QMAT_GRAPHS_CACHE_CACHE_FILES_H
 
-#include "graphs/cache/cache.h"
+#include "core/digest.h"
+#include "graphs/cache/remote_cache.h"
 
-/* The files of a cache: where they are, and how they are written. One thread at a time uses a qmat_cache. */
+/* An open cache, where its files are, and how they are written. One thread at a time uses a qmat_cache. */
+
+typedef enum qmat_cache_kind {
+  QMAT_CACHE_RECORD,
+  QMAT_CACHE_BLOB,
+  QMAT_CACHE_TEMPORARY,
+  QMAT_CACHE_BAD,
+  QMAT_CACHE_KIND_COUNT
+} qmat_cache_kind;
+
+typedef struct qmat_cache {
+  char *folder; /* ends in '/' */
+  bool read_only;
+  uint64_t most_size;
+  bool stored;            /* something was added since the last trim */
+  bool uncounted;         /* something was added that the file `size` does not count */
+  uint64_t counted_ahead; /* bytes that the file `size` counts and that are not stored yet */
+  bool ready;             /* its folders exist */
+  unsigned temporaries;   /* how many were made */
+  char warning[384];      /* the first failure, or that it is too small; "": none */
+  qmat_digest *bad;       /* damaged files that could not be moved to bad/ */
+  size_t bad_count, bad_capacity;
+  qmat_remote_cache *remote; /* NULL: none */
+} qmat_cache;
 
 /* The folder of a kind inside the cache, which ends in '/'. A constant. */
 const char *qmat_cache_kind_folder(qmat_cache_kind kind);

@@ -2,7 +2,7 @@
 #ifndef QMAT_GRAPHS_CACHE_CACHE_SIZE_H
 #define QMAT_GRAPHS_CACHE_CACHE_SIZE_H
 
-#include "graphs/cache/cache.h"
+#include "graphs/cache/cache_files.h"
 
 /* How much a cache holds, without a listing: the file `size` in its folder. Its first line is the size of all records
  * and blobs at the last listing, 20 digits. Each byte after it stands for 64 KiB that may have been stored since, so
