@@ -478,6 +478,11 @@ static void test_equal_files_that_lead_to_different_ones_are_all_found_again(voi
   write_text(path, "another");
   run_once(f, "3");
   assert_string_equal(f->states, "rrr");
+  /* Where the second file changed, which third one follows is not known. */
+  snprintf(path, sizeof path, "%s.side", f->model);
+  write_text(path, "!mesh77");
+  foresee(f, "3");
+  assert_string_equal(f->why[0], "would run:|the side file model.side changed");
 }
 
 static void test_forced_nodes_run_and_are_the_same(void **state) {
