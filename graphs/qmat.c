@@ -495,7 +495,8 @@ qmat_result qmat_job_run(qmat_job *job, int threads, qmat_job_progress progress,
   if (status == QMAT_OK) status = qmat_run_execute(context, &job->run, NULL);
   if (status == QMAT_OK) status = qmat_run_make_files(context, &job->run);
   if (status == QMAT_OK) status = qmat_run_write(context, &job->run);
-  if (status == QMAT_OK) { /* now, since it has texts of the graph, which may change */
+  qmat_cache_trim(&job->cache); /* the report has its warning */
+  if (status == QMAT_OK) {      /* now, since it has texts of the graph, which may change */
     json_t *report = qmat_run_report(context, &job->run);
     status = dump(context, report, &job->run_report);
     json_decref(report);

@@ -13,126 +13,28 @@
 #include <unistd.h>
 
 #include "core/value_form.h"
+#include "graphs/cache/cache_files.h"
 #include "graphs/cache/cache_record.h"
+#include "graphs/cache/cache_size.h"
 #include "io/bytes.h"
-
-static const char *const kind_folders[QMAT_CACHE_KIND_COUNT] = {"ac/", "cas/", "tmp/", "bad/"};
 
 static const char tag_text[] =
     "Signature: 8a477f597d28d172789f06886806bc55\n"
     "# This folder is a cache of qmat: everything in it can be made again.\n"
     "# About cache directory tags: https://bford.info/cachedir/\n";
 
-/* ---- paths and files ---- */
-
-static char *path_of(const qmat_cache *cache, qmat_cache_kind kind, const char *name) {
-  size_t folder = strlen(cache->folder), size = folder + strlen(kind_folders[kind]) + strlen(name) + 1;
-  char *path = qmat_alloc(size, 1);
-  if (path) snprintf(path, size, "%s%s%s", cache->folder, kind_folders[kind], name);
-  return path;
-}
-
-static char *path_of_digest(const qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
-  char hex[65];
-  qmat_digest_hex(digest, hex);
-  return path_of(cache, kind, hex);
-}
-
-static void warn_of(qmat_cache *cache, const char *failure, const char *path, int number) {
-  const char *reason = strerrordesc_np(number);
-  if (!*cache->warning)
-    snprintf(cache->warning, sizeof cache->warning, "cannot %s %s: %s", failure, path,
-             reason ? reason : "unknown error");
-}
-
-static void warn(qmat_cache *cache, const char *what, const char *path, int number) {
-  char failure[64];
-  snprintf(failure, sizeof failure, "write to the cache: %s", what);
-  warn_of(cache, failure, path, number);
-}
-
-/* Makes a folder and its parents. */
-static bool make_folders(char *path) {
-  if (mkdir(path, 0777) == 0 || errno == EEXIST) return true;
-  char *slash = strrchr(path, '/');
-  if (errno != ENOENT || !slash || slash == path) return false;
-  *slash = 0;
-  bool made = make_folders(path);
-  *slash = '/';
-  return made && (mkdir(path, 0777) == 0 || errno == EEXIST);
-}
-
-static bool write_all(int file, const void *bytes, size_t size) {
-  const char *at = bytes;
-  while (size > 0) {
-    ssize_t done = write(file, at, size < (size_t)1 << 30 ? size : (size_t)1 << 30);
-    if (done < 0 && errno == EINTR) continue;
-    if (done < 0) return false;
-    at += done;
-    size -= (size_t)done;
-  }
-  return true;
-}
-
-/* Makes a temporary file with a lock that lasts as long as its writer; -1 with errno. */
-static int make_temporary(qmat_cache *cache, char **path) {
-  for (int attempt = 0; attempt < 1000; attempt++) {
-    char name[64];
-    struct timespec time;
-    clock_gettime(CLOCK_REALTIME, &time);
-    snprintf(name, sizeof name, "%ld-%lld%09ld-%u", (long)getpid(), (long long)time.tv_sec, time.tv_nsec,
-             cache->temporaries++);
-    *path = path_of(cache, QMAT_CACHE_TEMPORARY, name);
-    if (!*path) {
-      errno = ENOMEM;
-      return -1;
-    }
-    int file = open(*path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    /* Any other error: the file system has no locks, and a sweep cannot take one either. */
-    if (file >= 0 && (flock(file, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)) return file;
-    int number = errno;
-    if (file >= 0) close(file);
-    qmat_free(*path);
-    *path = NULL;
-    errno = number;
-    if (number != EEXIST && number != EWOULDBLOCK) return -1;
-  }
-  return -1;
-}
-
-/* Writes a file, whole or not at all. */
-static bool place_file(qmat_cache *cache, const char *path, const void *bytes, size_t size) {
-  char *temporary = NULL;
-  bool done = false;
-  /* A sweep may delete a temporary just before it is locked: then try again. */
-  for (int attempt = 0; attempt < 3 && !done; attempt++) {
-    int file = make_temporary(cache, &temporary);
-    done = file >= 0 && write_all(file, bytes, size) && (fsync(file) == 0 || errno == EINVAL) &&
-           rename(temporary, path) == 0;
-    int number = errno;
-    if (!done && temporary) unlink(temporary);
-    if (file >= 0) close(file);
-    qmat_free(temporary);
-    temporary = NULL;
-    if (done || number == ENOENT) continue;
-    warn(cache, "storing", path, number);
-    return false;
-  }
-  if (!done) warn(cache, "storing", path, ENOENT);
-  if (done) cache->stored += size;
-  return done;
-}
+/* ---- folders ---- */
 
 /* Makes the folders at the first use. */
 static bool make_ready(qmat_cache *cache) {
   if (cache->ready) return true;
   if (cache->read_only) return false;
   for (int kind = 0; kind < QMAT_CACHE_KIND_COUNT; kind++) {
-    char *folder = path_of(cache, (qmat_cache_kind)kind, "");
+    char *folder = qmat_cache_path(cache, (qmat_cache_kind)kind, "");
     if (!folder) return false;
     folder[strlen(folder) - 1] = 0;
-    bool made = make_folders(folder);
-    if (!made) warn(cache, "making the folder", folder, errno);
+    bool made = qmat_cache_make_folders(folder);
+    if (!made) qmat_cache_warn(cache, "write to the cache: making the folder", folder, errno);
     qmat_free(folder);
     if (!made) return false;
   }
@@ -141,7 +43,7 @@ static bool make_ready(qmat_cache *cache) {
   if (!tag) return false;
   snprintf(tag, size, "%sCACHEDIR.TAG", cache->folder);
   cache->ready = true;
-  if (access(tag, F_OK) != 0) cache->ready = place_file(cache, tag, tag_text, sizeof tag_text - 1);
+  if (access(tag, F_OK) != 0) cache->ready = qmat_cache_place_file(cache, tag, tag_text, sizeof tag_text - 1);
   qmat_free(tag);
   qmat_cache_collect(cache, UINT64_MAX, false);
   return cache->ready;
@@ -152,7 +54,7 @@ static bool is_unreadable(qmat_cache *cache, const char *path) {
   const int file = path ? open(path, O_RDONLY | O_CLOEXEC) : -1, number = errno;
   if (file >= 0) close(file);
   if (!path || file >= 0 || number == ENOENT || number == ENOTDIR) return false;
-  warn_of(cache, "read the cache:", path, number);
+  qmat_cache_warn(cache, "read the cache:", path, number);
   return true;
 }
 
@@ -187,8 +89,24 @@ qmat_status qmat_cache_open(qmat_context *context, const qmat_cache_options *opt
   return cache->remote ? QMAT_OK : qmat_fail_memory(context, "remote cache");
 }
 
+void qmat_cache_trim(qmat_cache *cache) {
+  int lock = -1;
+  if (!cache->stored || !qmat_cache_may_be_full(cache)) return;
+  /* Another process may just have finished a sweep: then the file has changed. */
+  if (qmat_cache_begin_sweep(cache, &lock) && qmat_cache_may_be_full(cache)) {
+    const qmat_cache_sweep sweep = qmat_cache_collect(cache, cache->most_size, false);
+    if (sweep.recent > 0 && !*cache->warning)
+      snprintf(cache->warning, sizeof cache->warning,
+               "the cache is too small for this work: %zu of its files that were used within the last day were "
+               "deleted to keep it below %.6g MB; raise --cache-size",
+               sweep.recent, (double)cache->most_size / 1e6);
+  }
+  if (lock >= 0) close(lock);
+  cache->stored = false;
+}
+
 void qmat_cache_close(qmat_cache *cache) {
-  if (cache->stored > 0) qmat_cache_collect(cache, cache->most_size, false);
+  qmat_cache_trim(cache);
   qmat_remote_close(cache->remote);
   qmat_free(cache->folder);
   qmat_free(cache->bad);
@@ -213,7 +131,8 @@ static bool is_bad(const qmat_cache *cache, const qmat_digest *digest) {
 
 /* Moves a damaged file to bad/. If that fails, the cache remembers it as damaged. */
 static bool set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
-  char *from = path_of_digest(cache, kind, digest), *to = path_of_digest(cache, QMAT_CACHE_BAD, digest);
+  char *from = qmat_cache_path_of_digest(cache, kind, digest),
+       *to = qmat_cache_path_of_digest(cache, QMAT_CACHE_BAD, digest);
   bool moved = from && to && !cache->read_only && (rename(from, to) == 0 || unlink(from) == 0);
   qmat_free(from);
   qmat_free(to);
@@ -226,8 +145,9 @@ static bool set_aside(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest
 /* Stores bytes in the folder. */
 static bool keep_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
                        size_t size) {
-  char *path = path_of_digest(cache, kind, digest);
-  bool kept = path && make_ready(cache) && place_file(cache, path, bytes, size);
+  char *path = qmat_cache_path_of_digest(cache, kind, digest);
+  bool kept = path && make_ready(cache) && qmat_cache_place_file(cache, path, bytes, size);
+  if (kept) qmat_cache_count(cache, size);
   qmat_free(path);
   return kept;
 }
@@ -240,7 +160,7 @@ static json_t *remote_record(qmat_cache *cache, const qmat_digest *key) {
   const uint64_t most_size = (uint64_t)1 << 24;
   qmat_writer body = {0};
   json_t *record = NULL;
-  if (qmat_remote_get(cache->remote, kind_folders[QMAT_CACHE_RECORD], key, most_size, &body)) {
+  if (qmat_remote_get(cache->remote, qmat_cache_kind_folder(QMAT_CACHE_RECORD), key, most_size, &body)) {
     record = qmat_record_parse(body.bytes, body.size, key);
     if (record)
       keep_bytes(cache, QMAT_CACHE_RECORD, key, body.bytes, body.size);
@@ -253,7 +173,7 @@ static json_t *remote_record(qmat_cache *cache, const qmat_digest *key) {
 
 json_t *qmat_cache_record(qmat_cache *cache, const qmat_digest *key) {
   qmat_bytes bytes = {0};
-  char *path = path_of_digest(cache, QMAT_CACHE_RECORD, key);
+  char *path = qmat_cache_path_of_digest(cache, QMAT_CACHE_RECORD, key);
   json_t *record = NULL;
   if (path && !is_bad(cache, key) && read_file(cache, path, &bytes)) {
     record = qmat_record_parse(bytes.data, bytes.size, key);
@@ -266,7 +186,7 @@ json_t *qmat_cache_record(qmat_cache *cache, const qmat_digest *key) {
 
 static bool has_locally(const qmat_cache *cache, const qmat_digest *digest, uint64_t size) {
   struct stat about;
-  char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
+  char *path = qmat_cache_path_of_digest(cache, QMAT_CACHE_BLOB, digest);
   bool there = path && !is_bad(cache, digest) && stat(path, &about) == 0 && (uint64_t)about.st_size == size;
   qmat_free(path);
   return there;
@@ -274,7 +194,7 @@ static bool has_locally(const qmat_cache *cache, const qmat_digest *digest, uint
 
 static bool has_blob(qmat_cache *cache, const qmat_digest *digest, uint64_t size) {
   return has_locally(cache, digest, size) ||
-         qmat_remote_has(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size);
+         qmat_remote_has(cache->remote, qmat_cache_kind_folder(QMAT_CACHE_BLOB), digest, size);
 }
 
 /* The items of a list, each in a blob of its own. Items are never lists. */
@@ -298,7 +218,7 @@ static qmat_value *parse_value(const uint8_t *bytes, size_t size, const qmat_dig
 static qmat_value *local_value(qmat_cache *cache, const qmat_digest *digest, const qmat_value_source *items) {
   qmat_value *value = NULL;
   qmat_bytes bytes = {0};
-  char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
+  char *path = qmat_cache_path_of_digest(cache, QMAT_CACHE_BLOB, digest);
   if (path && !is_bad(cache, digest) && read_file(cache, path, &bytes)) {
     value = parse_value(bytes.data, bytes.size, digest, items);
     const list_items *list = items ? items->user : NULL;
@@ -313,7 +233,7 @@ static qmat_value *remote_value(qmat_cache *cache, const qmat_digest *digest, ui
                                 const qmat_value_source *items) {
   qmat_writer body = {0};
   qmat_value *value = NULL;
-  if (qmat_remote_get(cache->remote, kind_folders[QMAT_CACHE_BLOB], digest, size, &body)) {
+  if (qmat_remote_get(cache->remote, qmat_cache_kind_folder(QMAT_CACHE_BLOB), digest, size, &body)) {
     value = body.size == size ? parse_value(body.bytes, body.size, digest, items) : NULL;
     const list_items *list = items ? items->user : NULL;
     if (value)
@@ -344,7 +264,7 @@ qmat_value *qmat_cache_value(qmat_cache *cache, const qmat_digest *digest, uint6
 }
 
 static void touch(const qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest) {
-  char *path = cache->read_only ? NULL : path_of_digest(cache, kind, digest);
+  char *path = cache->read_only ? NULL : qmat_cache_path_of_digest(cache, kind, digest);
   if (path) (void)utimensat(AT_FDCWD, path, NULL, 0);
   qmat_free(path);
 }
@@ -358,7 +278,7 @@ void qmat_cache_touch_record(qmat_cache *cache, const qmat_digest *key) {
 /* Sends bytes to the remote cache. A blob that it has already is not sent; a record may be newer and is sent again. */
 static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_digest *digest, const void *bytes,
                        size_t size) {
-  const char *folder = kind_folders[kind];
+  const char *folder = qmat_cache_kind_folder(kind);
   if (!qmat_remote_is_writable(cache->remote)) return false;
   return (kind == QMAT_CACHE_BLOB && qmat_remote_has(cache->remote, folder, digest, size)) ||
          qmat_remote_put(cache->remote, folder, digest, bytes, size);
@@ -368,7 +288,7 @@ static bool send_bytes(qmat_cache *cache, qmat_cache_kind kind, const qmat_diges
  * would not be stored. */
 static bool is_kept(qmat_cache *cache, const qmat_digest *digest, size_t size) {
   qmat_digest found;
-  char *path = path_of_digest(cache, QMAT_CACHE_BLOB, digest);
+  char *path = qmat_cache_path_of_digest(cache, QMAT_CACHE_BLOB, digest);
   const bool unreadable = is_unreadable(cache, path), there = !unreadable && has_locally(cache, digest, size);
   const bool sound = there && path && qmat_digest_of_file(path, &found) == QMAT_OK && qmat_digest_equal(&found, digest);
   qmat_free(path);
@@ -470,7 +390,7 @@ static bool is_ours(qmat_cache_kind kind, const char *name, qmat_digest *digest)
 }
 
 static bool list_kind(const qmat_cache *cache, qmat_cache_kind kind, entry_list *list) {
-  char *path = path_of(cache, kind, "");
+  char *path = qmat_cache_path(cache, kind, "");
   DIR *folder = path ? opendir(path) : NULL;
   bool done = path != NULL;
   qmat_free(path);
@@ -490,6 +410,16 @@ static bool list_kind(const qmat_cache *cache, qmat_cache_kind kind, entry_list 
   return done;
 }
 
+static int64_t now_nanoseconds(void) {
+  struct timespec time;
+  clock_gettime(CLOCK_REALTIME, &time);
+  return (int64_t)time.tv_sec * 1000000000 + time.tv_nsec;
+}
+
+static bool is_recent(const qmat_cache_entry *entry, int64_t now) {
+  return now - entry->used < (int64_t)24 * 3600 * 1000000000;
+}
+
 static int by_kind_and_name(const void *a, const void *b) {
   const qmat_cache_entry *first = a, *second = b;
   return first->kind != second->kind ? (first->kind > second->kind) - (first->kind < second->kind)
@@ -500,6 +430,25 @@ static int by_last_use(const void *a, const void *b) {
   const qmat_cache_entry *first = a, *second = b;
   return first->used != second->used ? (first->used > second->used) - (first->used < second->used)
                                      : by_kind_and_name(a, b);
+}
+
+/* The order of chance: by a hash of the last use to 2 s, so that the record of a result and its blobs stay together. */
+static int by_chance(const void *a, const void *b) {
+  const qmat_cache_entry *first = a, *second = b;
+  const uint64_t factor = 0x9e3779b97f4a7c15u, x = (uint64_t)(first->used >> 31) * factor,
+                 y = (uint64_t)(second->used >> 31) * factor;
+  return x != y ? (x > y) - (x < y) : by_last_use(a, b);
+}
+
+/* Sorts entries by how little they are worth keeping: by their last use. Of the last day, the older half is in an order
+ * of chance: work in the same order each day that does not fit would find nothing again, as each result would be
+ * deleted just before its turn. */
+static void sort_victims(qmat_cache_entry *entries, size_t count, int64_t now) {
+  size_t old = 0;
+  if (count == 0) return;
+  qsort(entries, count, sizeof *entries, by_last_use);
+  while (old < count && !is_recent(&entries[old], now)) old++;
+  if (count - old > 1) qsort(entries + old, (count - old) / 2, sizeof *entries, by_chance);
 }
 
 bool qmat_cache_list(const qmat_cache *cache, qmat_cache_entry **entries, size_t *count) {
@@ -518,7 +467,7 @@ bool qmat_cache_list(const qmat_cache *cache, qmat_cache_entry **entries, size_t
 }
 
 static void delete_entry(const qmat_cache *cache, const qmat_cache_entry *entry, qmat_cache_sweep *sweep) {
-  char *path = path_of(cache, entry->kind, entry->name);
+  char *path = qmat_cache_path(cache, entry->kind, entry->name);
   if (path && unlink(path) == 0) {
     sweep->deleted++;
     sweep->freed += entry->size;
@@ -528,18 +477,12 @@ static void delete_entry(const qmat_cache *cache, const qmat_cache_entry *entry,
 
 /* Whether the writer of a temporary is gone. */
 static bool is_abandoned(const qmat_cache *cache, const qmat_cache_entry *entry) {
-  char *path = path_of(cache, entry->kind, entry->name);
+  char *path = qmat_cache_path(cache, entry->kind, entry->name);
   int file = path ? open(path, O_RDONLY | O_CLOEXEC) : -1;
   bool abandoned = file >= 0 && flock(file, LOCK_EX | LOCK_NB) == 0;
   if (file >= 0) close(file);
   qmat_free(path);
   return abandoned;
-}
-
-static int64_t now_nanoseconds(void) {
-  struct timespec time;
-  clock_gettime(CLOCK_REALTIME, &time);
-  return (int64_t)time.tv_sec * 1000000000 + time.tv_nsec;
 }
 
 /* The entry of a blob in a sorted list, or NULL. */
@@ -591,6 +534,8 @@ qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool 
   qmat_cache_sweep sweep = {0};
   if (cache->read_only) return sweep;
   entry_list list = {0};
+  const int64_t now = now_nanoseconds();
+  const uint64_t length = qmat_cache_size_length(cache);
   if (most_size == UINT64_MAX && !thorough) {
     list_kind(cache, QMAT_CACHE_TEMPORARY, &list);
   } else if (!qmat_cache_list(cache, &list.entries, &list.count)) {
@@ -610,13 +555,17 @@ qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool 
   if (total > most_size) {
     /* A tenth below the limit, so that the next run need not delete again. */
     uint64_t wanted = most_size - most_size / 10;
-    qsort(list.entries, list.count, sizeof *list.entries, by_last_use);
+    sort_victims(list.entries, list.count, now);
     for (size_t i = 0; i < list.count && total > wanted; i++) {
-      if (list.entries[i].kind > QMAT_CACHE_BLOB) continue;
-      delete_entry(cache, &list.entries[i], &sweep);
-      total -= list.entries[i].size;
+      const qmat_cache_entry *entry = &list.entries[i];
+      if (entry->kind > QMAT_CACHE_BLOB) continue;
+      const size_t before = sweep.deleted;
+      delete_entry(cache, entry, &sweep);
+      total -= entry->size;
+      if (sweep.deleted > before && is_recent(entry, now)) sweep.recent++;
     }
   }
+  if (most_size != UINT64_MAX || thorough) qmat_cache_note_size(cache, total, length);
   qmat_free(list.entries);
   return sweep;
 }
@@ -631,12 +580,13 @@ qmat_cache_sweep qmat_cache_clear(qmat_cache *cache) {
     if (entries[i].kind != QMAT_CACHE_TEMPORARY || is_abandoned(cache, &entries[i]))
       delete_entry(cache, &entries[i], &sweep);
   qmat_free(entries);
+  qmat_cache_note_size(cache, 0, 0);
   return sweep;
 }
 
 /* Whether another process has deleted an entry since it was listed. */
 static bool is_gone(const qmat_cache *cache, const qmat_cache_entry *entry) {
-  char *path = path_of(cache, entry->kind, entry->name);
+  char *path = qmat_cache_path(cache, entry->kind, entry->name);
   const bool gone = path && access(path, F_OK) != 0 && errno == ENOENT;
   qmat_free(path);
   return gone;
@@ -670,7 +620,7 @@ static bool is_intact(const qmat_cache_entry *entry, const char *path) {
 
 qmat_cache_health qmat_cache_check(qmat_cache *cache, const qmat_cache_entry *entry) {
   if (entry->kind > QMAT_CACHE_BLOB) return QMAT_CACHE_SOUND;
-  char *path = path_of(cache, entry->kind, entry->name);
+  char *path = qmat_cache_path(cache, entry->kind, entry->name);
   const bool unreadable = is_unreadable(cache, path), intact = !unreadable && path && is_intact(entry, path);
   qmat_free(path);
   if (unreadable) return QMAT_CACHE_UNREADABLE;

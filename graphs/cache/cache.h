@@ -3,14 +3,16 @@
 #define QMAT_GRAPHS_CACHE_CACHE_H
 
 #include "core/value.h"
-#include "graphs/cache/remote_cache.h"
+#include "graphs/cache/cache_files.h"
 
 /* A store of results, shared by any number of processes:
  *
- *     ac/KEY        a record: the node that ran, its readable key, and the digests of its outputs
+ *     ac/KEY        a record: the node that ran, its readable key, and the digests of its outputs; or the side files
+ *                   that every run of this key has read, whose digests lead to the next key
  *     cas/DIGEST    a blob: the serialised form of a value, named by the digest of its bytes
  *     tmp/          files being written; their writers hold a lock on them
  *     bad/          damaged blobs and records, kept for inspection
+ *     size          about how many bytes there are (cache_size.h)
  *
  * A remote cache may hold the same files. Missing files are fetched from it into the folder; stored files go to both.
  *
@@ -29,24 +31,17 @@ typedef struct qmat_cache_options {
 
 #define QMAT_CACHE_SIZE ((uint64_t)10000000000)
 
-typedef struct qmat_cache {
-  char *folder; /* ends in '/' */
-  bool read_only;
-  uint64_t most_size;
-  uint64_t stored;      /* bytes added since it was opened */
-  bool ready;           /* its folders exist */
-  unsigned temporaries; /* how many were made */
-  char warning[384];    /* the first failure; "": none */
-  qmat_digest *bad;     /* damaged files that could not be moved to bad/ */
-  size_t bad_count, bad_capacity;
-  qmat_remote_cache *remote; /* NULL: none */
-} qmat_cache;
-
 /* Opens the cache in a folder, which is made when something is stored. QMAT_ERROR_USAGE: the path is a file, or the
  * remote URL is not http or https. Free with qmat_cache_close, also after a failure. */
 qmat_status qmat_cache_open(qmat_context *context, const qmat_cache_options *options, qmat_cache *cache);
 
-/* Frees the cache; if anything was stored, deletes files above the size first. Works on a zeroed cache. */
+/* If anything was stored: deletes the least recently used files when the cache may be above its size, and sets the
+ * warning when some of them were used within the last day. A run calls it before it tells the warning. The folder is
+ * listed only when the file `size` says so, and by one process at a time. Processes that are still running may stand
+ * above the limit; where counts were lost, an eighth of it may be added. */
+void qmat_cache_trim(qmat_cache *cache);
+
+/* Trims the cache and frees it. Works on a zeroed cache. */
 void qmat_cache_close(qmat_cache *cache);
 
 /* The default folder: $XDG_CACHE_HOME/qmat, else ~/.cache/qmat. NULL when neither is an absolute path or memory is
@@ -85,14 +80,6 @@ bool qmat_cache_put_record(qmat_cache *cache, const qmat_digest *key, const json
 
 /* ---- maintenance ---- */
 
-typedef enum qmat_cache_kind {
-  QMAT_CACHE_RECORD,
-  QMAT_CACHE_BLOB,
-  QMAT_CACHE_TEMPORARY,
-  QMAT_CACHE_BAD,
-  QMAT_CACHE_KIND_COUNT
-} qmat_cache_kind;
-
 /* A file of the cache. */
 typedef struct qmat_cache_entry {
   qmat_cache_kind kind;
@@ -107,13 +94,13 @@ typedef struct qmat_cache_entry {
 bool qmat_cache_list(const qmat_cache *cache, qmat_cache_entry **entries, size_t *count);
 
 typedef struct qmat_cache_sweep {
-  size_t deleted;
+  size_t deleted, recent; /* recent: of the least recently used, those that were used within the last day */
   uint64_t freed;
 } qmat_cache_sweep;
 
 /* Deletes temporaries whose writers are gone, and the least recently used records and blobs until at most `most_size`
- * bytes remain. With `thorough` also damaged files, and records with a missing blob and unnamed blobs that are older
- * than an hour. */
+ * bytes remain; among the older half of those of the last day in an order of chance. With `thorough` also damaged
+ * files, and records with a missing blob and unnamed blobs that are older than an hour. */
 qmat_cache_sweep qmat_cache_collect(qmat_cache *cache, uint64_t most_size, bool thorough);
 
 /* Deletes every file of the cache, but no foreign file. */

@@ -306,6 +306,7 @@ qmat_status qmat_execute(qmat_context *context, qmat_invocation *invocation,
   }
   if (status == QMAT_OK && depfile && !dry)
     status = qmat_run_write_depfile(context, run, depfile, invocation->streams.folder);
+  if (planned.cached && !dry) qmat_cache_trim(&planned.cache); /* the report has its warning */
   if (status == QMAT_OK && report_path && !dry) {
     json_t *report = qmat_run_report(context, run);
     qmat_streams_name_in(&invocation->streams, report);

@@ -51,10 +51,9 @@ typedef struct qmat_run_step {
   bool wanted; /* runs whether or not its outputs are read */
   bool forced; /* runs whatever the cache has */
   qmat_step_state state;
-  bool keyed;            /* the next three are set: there is a cache, and every input file is readable */
-  json_t *key_items;     /* what its key is made of */
-  qmat_digest key;       /* of all items */
-  qmat_digest first_key; /* of the items known before the node runs: without side files */
+  bool keyed;        /* the next two are set: there is a cache, and every input file is readable */
+  json_t *key_items; /* what its key is made of */
+  qmat_digest key;   /* of all items */
   double seconds;
   qmat_run_made *made;    /* per output port */
   json_t *report;         /* of its first report output, see qmat_report_json; NULL: it makes none */

@@ -195,11 +195,11 @@ bool qmat_run_look_up(qmat_run *run, size_t index) {
   step->key_items = make_items(run, step);
   step->keyed = step->key_items && qmat_key_digest(step->key_items, &step->key);
   if (!step->keyed) return false;
-  step->first_key = step->key;
   json_t *record = qmat_cache_record(run->cache, &step->key);
-  const json_t *sides = json_object_get(record, "sides");
-  if (sides) {
-    bool whole = add_sides(run, step, sides, step->key_items) && qmat_key_digest(step->key_items, &step->key);
+  /* Each record of side files leads to the next key. An empty one would lead to itself. */
+  for (const json_t *sides; json_array_size(sides = json_object_get(record, "sides")) > 0;) {
+    qmat_cache_touch_record(run->cache, &step->key);
+    const bool whole = add_sides(run, step, sides, step->key_items) && qmat_key_digest(step->key_items, &step->key);
     json_decref(record);
     record = whole ? qmat_cache_record(run->cache, &step->key) : NULL;
   }
@@ -223,6 +223,7 @@ qmat_value *qmat_run_load(qmat_run *run, size_t index, size_t port) {
 typedef struct side_file {
   const char *param, *path;
   const qmat_run_file_digest *file;
+  bool linked, next; /* its digest leads to the key so far; it is named by the record of that key */
 } side_file;
 
 static int by_name(const void *a, const void *b) {
@@ -317,16 +318,58 @@ static void compare_with_record(qmat_run *run, const qmat_run_step *step) {
   json_decref(record);
 }
 
-/* Stores the names of the side files under the key without side files. */
-static bool put_sides(qmat_run *run, const qmat_run_step *step, const side_file *sides, size_t count, json_t *items) {
-  json_t *record = start_record(items, step->seconds), *names = json_array();
-  bool done = record && names;
-  for (size_t i = 0; i < count && done; i++)
-    done = json_array_append_new(names, json_pack("[s, s]", sides[i].param, sides[i].path)) == 0;
-  done = done && json_object_set(record, "sides", names) == 0 &&
-         qmat_cache_put_record(run->cache, &step->first_key, record);
-  json_decref(names);
+/* Stores the names of side files under the key of the items so far. */
+static bool put_sides(qmat_run *run, const qmat_run_step *step, json_t *items, const qmat_digest *key, json_t *names) {
+  json_t *record = start_record(items, step->seconds);
+  const bool done =
+      record && json_object_set(record, "sides", names) == 0 && qmat_cache_put_record(run->cache, key, record);
   json_decref(record);
+  return done;
+}
+
+/* Chooses the side files that the record of the key so far names: those that it named before and this run has read too.
+ * Returns the names, NULL when memory is short. */
+static json_t *choose_next(side_file *sides, size_t count, const json_t *before) {
+  json_t *names = json_array();
+  bool done = names != NULL, any = false;
+  for (size_t i = 0; i < count; i++) {
+    json_t *name = json_pack("[s, s]", sides[i].param, sides[i].path);
+    sides[i].next = false;
+    for (size_t k = 0; k < json_array_size(before) && !sides[i].linked; k++)
+      if (json_equal(json_array_get(before, k), name)) sides[i].next = any = true;
+    json_decref(name);
+  }
+  for (size_t i = 0; i < count && done; i++) {
+    sides[i].next = any ? sides[i].next : !sides[i].linked;
+    if (sides[i].next) done = json_array_append_new(names, json_pack("[s, s]", sides[i].param, sides[i].path)) == 0;
+  }
+  if (done) return names;
+  json_decref(names);
+  return NULL;
+}
+
+/* Adds the side files to the items of a key. The record of each key on the way names the files whose digests lead to
+ * the next one. It names what every run that came to this key has read, so that files with the same bytes that
+ * refer to different files, such as the root layers of two assets, each keep their way. What a node reads first depends
+ * on the bytes before it alone, so that there always is such a file. */
+static bool link_sides(qmat_run *run, const qmat_run_step *step, side_file *sides, size_t count, json_t *items) {
+  bool done = true;
+  for (size_t linked = 0; linked < count && done;) {
+    qmat_digest key;
+    if (!qmat_key_digest(items, &key)) return false;
+    json_t *record = qmat_cache_record(run->cache, &key), *before = json_object_get(record, "sides");
+    json_t *names = choose_next(sides, count, before);
+    done = names && (json_equal(names, before) || put_sides(run, step, items, &key, names));
+    for (size_t i = 0; i < count && done; i++) {
+      if (!sides[i].next) continue;
+      const qmat_run_file_digest *file = sides[i].file;
+      done = qmat_key_add_side_file(items, sides[i].param, sides[i].path, file->readable ? &file->digest : NULL);
+      sides[i].linked = true;
+      linked++;
+    }
+    json_decref(names);
+    json_decref(record);
+  }
   return done;
 }
 
@@ -335,25 +378,20 @@ void qmat_run_store(qmat_run *run, size_t index, const qmat_step_reads *reads) {
   if (!run->cache || !step->keyed || !qmat_cache_is_writable(run->cache) || reads->incomplete) return;
   side_file *sides = qmat_alloc(reads->count, sizeof *sides);
   size_t side_count;
-  json_t *first_items = make_items(run, step), *items = json_deep_copy(first_items);
+  json_t *items = make_items(run, step);
   bool done = sides && items && find_sides(run, step, reads, sides, &side_count), any_added = false;
-  for (size_t i = 0; done && i < side_count; i++)
-    done = qmat_key_add_side_file(items, sides[i].param, sides[i].path,
-                                  sides[i].file->readable ? &sides[i].file->digest : NULL);
-  done = done && qmat_key_digest(items, &step->key);
+  done = done && link_sides(run, step, sides, side_count, items) && qmat_key_digest(items, &step->key);
   if (done) {
     json_decref(step->key_items);
     step->key_items = json_incref(items);
     compare_with_record(run, step);
     json_t *outputs = put_outputs(run, step, &any_added), *record = start_record(items, step->seconds);
     if (outputs && record && json_object_set(record, "outputs", outputs) == 0 &&
-        (side_count == 0 || put_sides(run, step, sides, side_count, first_items)) &&
         qmat_cache_put_record(run->cache, &step->key, record) && !any_added)
       step->state = QMAT_STEP_SAME;
     json_decref(outputs);
     json_decref(record);
   }
-  json_decref(first_items);
   json_decref(items);
   qmat_free(sides);
 }

@@ -179,9 +179,13 @@ static void add_differences(const qmat_run *run, const qmat_run_step *step, cons
     const json_t *item = json_array_get(items, i), *other = find_item(before, item);
     if (!other || !json_equal(item, other)) add_difference(run, step, item, other, causes);
   }
-  for (size_t i = 0; i < json_array_size(before); i++)
-    if (!find_item(items, json_array_get(before, i)))
-      add_difference(run, step, NULL, json_array_get(before, i), causes);
+  /* Which side files follow those that changed is known when the node has run. */
+  const bool all_known = step->state == QMAT_STEP_HIT || json_array_size(causes) == 0;
+  for (size_t i = 0; i < json_array_size(before); i++) {
+    const json_t *item = json_array_get(before, i);
+    if (!find_item(items, item) && (all_known || strcmp(text_of(item, 0), "side") != 0))
+      add_difference(run, step, NULL, item, causes);
+  }
 }
 
 /* Adds the files that cannot be read, without which the step has no key. */

@@ -12,9 +12,11 @@
 #include <stdatomic.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <time.h>
 
 #include "graphs/cache/cache_key.h"
+#include "graphs/cache/cache_size.h"
 #include "graphs/run/why.h"
 #include "io/bytes.h"
 #include "nodes/nodes.h"
@@ -45,7 +47,7 @@ static void write_text(const char *path, const char *text) {
 }
 
 /* The bytes of a file, summed; one that starts with an exclamation mark refers to the file of the same path and
- * ".side", if that is there. */
+ * ".side", if that is there, which may refer to a further one in the same way. */
 static qmat_status read_run(qmat_context *context, const void *data, const qmat_value *const inputs[],
                             qmat_value *outputs[]) {
   (void)inputs;
@@ -62,6 +64,12 @@ static qmat_status read_run(qmat_context *context, const void *data, const qmat_
     snprintf(side_path, sizeof side_path, "%s.side", path);
     if (qmat_bytes_read_file(context, side_path, &side) == QMAT_OK)
       for (size_t i = 0; i < side.size; i++) sum += 1000 * side.data[i];
+  }
+  if (side.size > 1 && side.data[0] == '!') {
+    snprintf(side_path, sizeof side_path, "%s.%.*s", path, (int)side.size - 1, (const char *)side.data + 1);
+    qmat_bytes_uninit(&side);
+    if (qmat_bytes_read_file(context, side_path, &side) == QMAT_OK)
+      for (size_t i = 0; i < side.size; i++) sum += 100 * side.data[i];
   }
   qmat_bytes_uninit(&bytes);
   qmat_bytes_uninit(&side);
@@ -206,6 +214,7 @@ static const qmat_registry counted = {counted_table, sizeof counted_table / size
 typedef struct fixture {
   char folder[64], cache_folder[80], model[80];
   bool read_only;
+  uint64_t most_size;
   char warning[400];
   double result;    // of the last run
   char states[64];  // of its steps, by their first letters
@@ -238,7 +247,7 @@ static int tear_down(void **state) {
 
 static void open_cache(const fixture *f, qmat_cache *cache) {
   qmat_context context = {0};
-  const qmat_cache_options options = {.folder = f->cache_folder, .read_only = f->read_only};
+  const qmat_cache_options options = {.folder = f->cache_folder, .read_only = f->read_only, .most_size = f->most_size};
   test_ok(&context, qmat_cache_open(&context, &options, cache));
 }
 
@@ -285,6 +294,7 @@ static void run_graph(fixture *f, const char *factor, const char *last_factor, b
   } else {
     test_ok(&context, qmat_run_execute(&context, &run, NULL));
     f->result = test_value(qmat_run_value(&run, 2, 0));
+    qmat_cache_trim(&cache);
   }
   for (size_t i = 0; i < run.step_count; i++) f->states[i] = qmat_step_state_name(run.steps[i].state)[0];
   f->states[run.step_count] = 0;
@@ -435,6 +445,44 @@ static void test_side_files_count(void **state) {
   run_once(f, "3");
   assert_string_equal(f->states, "hhh");
   assert_true(f->result == 6 * ('!' + 'a'));
+}
+
+/* Twenty assets whose first files are the same bytes; each of the second files refers to another third one. */
+static void test_equal_files_that_lead_to_different_ones_are_all_found_again(void **state) {
+  fixture *f = *state;
+  enum { ASSETS = 20 };
+  double results[ASSETS];
+  char folder[80], path[120], text[40];
+  strcpy(folder, f->folder);
+  for (int pass = 0; pass < 4; pass++)
+    for (int i = 0; i < ASSETS; i++) {
+      snprintf(path, sizeof path, "%s/%d", folder, i);
+      if (pass == 0) assert_int_equal(mkdir(path, 0777), 0);
+      snprintf(f->model, sizeof f->model, "%s/%d/model", folder, i);
+      if (pass == 0) {
+        write_text(f->model, "!root");
+        snprintf(path, sizeof path, "%s.side", f->model);
+        snprintf(text, sizeof text, "!mesh%d", i);
+        write_text(path, text);
+        snprintf(path, sizeof path, "%s.mesh%d", f->model, i);
+        snprintf(text, sizeof text, "%d", 7 * i);
+        write_text(path, text);
+      }
+      run_once(f, "3");
+      if (pass == 0) results[i] = f->result;
+      assert_true(f->result == results[i]);
+      if (pass >= 2) assert_string_equal(f->states, "hhh"); /* the second pass parts the ways */
+    }
+  /* A change of the last file counts. */
+  snprintf(path, sizeof path, "%s.mesh%d", f->model, ASSETS - 1);
+  write_text(path, "another");
+  run_once(f, "3");
+  assert_string_equal(f->states, "rrr");
+  /* Where the second file changed, which third one follows is not known. */
+  snprintf(path, sizeof path, "%s.side", f->model);
+  write_text(path, "!mesh77");
+  foresee(f, "3");
+  assert_string_equal(f->why[0], "would run:|the side file model.side changed");
 }
 
 static void test_forced_nodes_run_and_are_the_same(void **state) {
@@ -1090,6 +1138,194 @@ static void test_what_was_used_least_recently_is_deleted_first(void **state) {
   qmat_cache_close(&cache);
 }
 
+static void test_work_that_does_not_fit_finds_a_part_of_it_again(void **state) {
+  fixture *f = *state;
+  enum { RESULTS = 20, PASSES = 10 };
+  qmat_context context = {0};
+  qmat_cache cache;
+  open_cache(f, &cache);
+  struct timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  size_t hits = 0, deleted = 0, recent = 0;
+  for (int turn = 0; turn < PASSES * RESULTS; turn++) {
+    bool added;
+    char path[256];
+    qmat_value *value;
+    test_ok(&context, test_report(&context, 10 + turn % RESULTS, &value));
+    json_t *stored = qmat_cache_put_value(&cache, value, &added);
+    hits += !added;
+    blob_path(f, 10 + turn % RESULTS, path);
+    const time_t used = now.tv_sec - 4 * (PASSES * RESULTS - turn);
+    const struct timespec times[2] = {{.tv_sec = used}, {.tv_sec = used}};
+    assert_int_equal(utimensat(AT_FDCWD, path, times, 0), 0);
+    const qmat_cache_sweep sweep = qmat_cache_collect(&cache, 16 * qmat_cache_stored_size(stored), false);
+    deleted += sweep.deleted;
+    recent += sweep.recent;
+    assert_true(qmat_cache_has_stored(&cache, stored)); /* what was just used stays */
+    json_decref(stored);
+    qmat_value_release(value);
+  }
+  assert_true(hits >= 20 && hits < 180);
+  assert_true(deleted > 0 && recent == deleted);
+  qmat_cache_close(&cache);
+}
+
+/* The file of how much the cache holds: its first line, and how many bytes follow. */
+static void read_size_file(const fixture *f, uint64_t *total, size_t *counted) {
+  char path[128], bytes[4096];
+  snprintf(path, sizeof path, "%s/size", f->cache_folder);
+  FILE *file = fopen(path, "rb");
+  assert_non_null(file);
+  const size_t size = fread(bytes, 1, sizeof bytes, file);
+  fclose(file);
+  assert_true(size >= 21 && bytes[20] == '\n');
+  *total = strtoull(bytes, NULL, 10);
+  *counted = size - 21;
+}
+
+static uint64_t listed_size(const fixture *f) {
+  qmat_cache cache;
+  qmat_cache_entry *entries;
+  size_t count;
+  uint64_t total = 0;
+  open_cache(f, &cache);
+  assert_true(qmat_cache_list(&cache, &entries, &count));
+  for (size_t i = 0; i < count; i++) total += entries[i].size;
+  qmat_free(entries);
+  qmat_cache_close(&cache);
+  return total;
+}
+
+/* A blob of 1,000 bytes that was last used in 1970. */
+static void plant_blob(const fixture *f, char path[256]) {
+  const struct timespec times[2] = {{.tv_sec = 1000}, {.tv_sec = 1000}};
+  char bytes[1001];
+  memset(bytes, 'x', 1000);
+  bytes[1000] = 0;
+  snprintf(path, 256, "%s/cas/%064d", f->cache_folder, 7);
+  write_text(path, bytes);
+  assert_int_equal(utimensat(AT_FDCWD, path, times, 0), 0);
+}
+
+static void test_the_folder_is_listed_only_when_it_may_be_above_its_size(void **state) {
+  fixture *f = *state;
+  char planted[256], size_file[128];
+  uint64_t first, total;
+  size_t counted;
+  write_text(f->model, "abc");
+  run_once(f, "3");
+  read_size_file(f, &first, &counted);
+  assert_int_equal(first, listed_size(f));
+  assert_int_equal(counted, 0);
+  plant_blob(f, planted);
+  run_once(f, "4");
+  read_size_file(f, &total, &counted);
+  assert_int_equal(total, first); /* no listing */
+  assert_int_equal(counted, 1);   /* a unit of 64 KiB for all that the run stored */
+  run_once(f, "4");
+  read_size_file(f, &total, &counted);
+  assert_int_equal(counted, 1); /* nothing was stored */
+  /* A damaged file, a cut one and none: the folder is listed. */
+  static const char *const damaged[] = {"0000000000000000x000\n", "000", "", "-000000000000000001\n"};
+  snprintf(size_file, sizeof size_file, "%s/size", f->cache_folder);
+  for (size_t i = 0; i <= sizeof damaged / sizeof *damaged; i++) {
+    char factor[8];
+    if (i < sizeof damaged / sizeof *damaged)
+      write_text(size_file, damaged[i]);
+    else
+      assert_int_equal(unlink(size_file), 0);
+    snprintf(factor, sizeof factor, "%d", 5 + (int)i);
+    run_once(f, factor);
+    assert_string_equal(f->warning, "");
+    read_size_file(f, &total, &counted);
+    assert_int_equal(total, listed_size(f));
+  }
+  /* A limit that the size is above: the blob that was used least recently goes. */
+  f->most_size = total - 500;
+  run_once(f, "20");
+  assert_int_equal(access(planted, F_OK), -1);
+  read_size_file(f, &total, &counted);
+  assert_int_equal(total, listed_size(f));
+  /* Deleting all leaves no count behind. */
+  qmat_cache cache;
+  open_cache(f, &cache);
+  qmat_cache_clear(&cache);
+  qmat_cache_close(&cache);
+  assert_int_equal(access(size_file, F_OK), -1);
+}
+
+static void test_what_killed_processes_stored_is_counted(void **state) {
+  fixture *f = *state;
+  uint64_t total;
+  size_t counted;
+  write_text(f->model, "abc");
+  run_once(f, "3");
+  for (int child = 0; child < 8; child++) {
+    const pid_t pid = fork();
+    assert_true(pid >= 0);
+    if (pid > 0) continue;
+    qmat_cache cache;
+    open_cache(f, &cache);
+    for (int i = 0; i < 200; i++) qmat_cache_count(&cache, 1 << 15); /* and is killed */
+    _exit(0);
+  }
+  int status;
+  while (wait(&status) > 0) assert_int_equal(status, 0);
+  read_size_file(f, &total, &counted);
+  assert_int_equal(counted, 8 * 100);
+  qmat_cache cache;
+  f->most_size = (uint64_t)800 << 19; /* an eighth of it is counted */
+  open_cache(f, &cache);
+  assert_false(qmat_cache_may_be_full(&cache));
+  qmat_cache_count(&cache, 1);
+  assert_true(qmat_cache_may_be_full(&cache));
+  qmat_cache_close(&cache);
+  read_size_file(f, &total, &counted);
+  assert_int_equal(counted, 0);
+  assert_int_equal(total, listed_size(f));
+}
+
+static void test_one_process_sweeps_at_a_time(void **state) {
+  fixture *f = *state;
+  char planted[256], size_file[128];
+  write_text(f->model, "abc");
+  run_once(f, "3");
+  plant_blob(f, planted);
+  f->most_size = listed_size(f) - 500;
+  snprintf(size_file, sizeof size_file, "%s/size", f->cache_folder);
+  const int file = open(size_file, O_RDONLY);
+  assert_int_equal(flock(file, LOCK_EX), 0);
+  run_once(f, "4");
+  assert_int_equal(access(planted, F_OK), 0); /* the other one is at it */
+  close(file);
+  run_once(f, "5");
+  assert_int_equal(access(planted, F_OK), -1);
+  /* A cache that is read only counts nothing. */
+  uint64_t total;
+  size_t counted, before;
+  read_size_file(f, &total, &before);
+  f->read_only = true;
+  run_once(f, "6");
+  read_size_file(f, &total, &counted);
+  assert_int_equal(counted, before);
+}
+
+static void test_a_cache_too_small_for_its_work_is_told(void **state) {
+  fixture *f = *state;
+  char path[256];
+  write_text(f->model, "abc");
+  run_once(f, "3");
+  f->most_size = listed_size(f);
+  plant_blob(f, path);
+  run_once(f, "4"); /* the planted blob is old, but does not suffice */
+  assert_non_null(strstr(f->warning, "the cache is too small for this work: "));
+  assert_non_null(strstr(f->warning, "--cache-size"));
+  f->most_size *= 4;
+  plant_blob(f, path);
+  run_once(f, "5");
+  assert_string_equal(f->warning, "");
+}
+
 static void test_temporaries_of_dead_writers_are_swept_and_others_stay(void **state) {
   fixture *f = *state;
   char dead[160], alive[160], foreign[160];
@@ -1207,6 +1443,7 @@ int main(void) {
       CASE(test_a_file_that_changes_before_it_is_read_is_not_kept),
       CASE(test_another_folder_hits_and_another_name_misses),
       CASE(test_side_files_count),
+      CASE(test_equal_files_that_lead_to_different_ones_are_all_found_again),
       CASE(test_forced_nodes_run_and_are_the_same),
       CASE(test_a_node_runs_once_for_each_value_of_a_list_and_what_is_known_of_one_stays),
       CASE(test_values_that_a_node_cannot_work_on_are_left_out_but_not_all_of_them),
@@ -1231,6 +1468,11 @@ int main(void) {
       CASE(test_why_names_the_version_of_a_library),
       CASE(test_why_names_the_format_of_keys),
       CASE(test_what_was_used_least_recently_is_deleted_first),
+      CASE(test_work_that_does_not_fit_finds_a_part_of_it_again),
+      CASE(test_the_folder_is_listed_only_when_it_may_be_above_its_size),
+      CASE(test_what_killed_processes_stored_is_counted),
+      CASE(test_one_process_sweeps_at_a_time),
+      CASE(test_a_cache_too_small_for_its_work_is_told),
       CASE(test_temporaries_of_dead_writers_are_swept_and_others_stay),
       CASE(test_checking_finds_what_is_broken_and_what_is_incomplete),
       CASE(test_a_file_that_may_not_be_read_is_told_once_and_left_alone),
