@@ -12,16 +12,19 @@
 /* The distance from a shell of the points that test its sides, in diagonals. */
 static const double beside = 1e-5;
 
+/* Loops over triangles and edges report progress each time after so many. */
+enum { ITEMS_A_REPORT = 1 << 16 };
+
 /* Joins the triangles at every edge into shells, and their corners into fans. `*paired` becomes false at an edge that
  * does not have two triangles. */
 static qmat_status join_at_edges(qmat_context *context, const qmat_mesh *mesh, uint32_t *shells, uint32_t *fans,
                                  bool *paired) {
   qmat_half_edges e;
-  const qmat_status status =
-      qmat_half_edges_sort(context, mesh->vertex_count, mesh->triangle_count, mesh->triangles, &e);
+  qmat_status status = qmat_half_edges_sort(context, mesh->vertex_count, mesh->triangle_count, mesh->triangles, &e);
   for (size_t i = 0; status == QMAT_OK && *paired && i < e.count; i += 2) {
     *paired = qmat_edge_last(&e, i) == i + 2;
     if (!*paired) break;
+    if (i % ITEMS_A_REPORT == ITEMS_A_REPORT - 2) status = qmat_progress(context, i, e.count, "edges");
     const uint32_t a = e.order[i], b = e.order[i + 1];
     const bool same_way = qmat_half_edge_start(&e, a) == qmat_half_edge_start(&e, b);
     qmat_sets_join(shells, a / 3, b / 3);
@@ -138,17 +141,22 @@ qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *su
            *fans = qmat_sets_new(context, 3 * mesh->triangle_count);
   shell *sums = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *sums);
   if (!shells || !fans || !sums) return qmat_fail_memory(context, "the topology");
-  const qmat_status status = join_at_edges(context, mesh, shells, fans, &topology->known);
+  qmat_status status = join_at_edges(context, mesh, shells, fans, &topology->known);
   if (!topology->known) topology->why_not = "an edge has more than two triangles: solids touch along it";
   if (status != QMAT_OK || !topology->known) return status;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     double normal[3], centre[3];
+    if (t % ITEMS_A_REPORT == ITEMS_A_REPORT - 1) status = qmat_progress(context, t, mesh->triangle_count, "triangles");
+    if (status != QMAT_OK) return status;
     triangle_vectors(surface, t, normal, centre);
     add_to_shell(&sums[qmat_set_leader(shells, (uint32_t)t)], fans, t, normal, centre);
   }
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     const shell *sum = &sums[t];
-    if (sum->triangle_count == 0 || !separates(surface, sum)) continue;
+    if (sum->triangle_count == 0) continue;
+    status = qmat_progress(context, t + 1, mesh->triangle_count, "triangles of shells");
+    if (status != QMAT_OK) return status;
+    if (!separates(surface, sum)) continue;
     /* Vertices - edges + triangles = 2 - 2 genus, and a triangle has three halves of an edge. */
     topology->loops += (2 + sum->triangle_count / 2 - sum->fan_count) / 2;
     if (sum->volume > 0)
