@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* medial.colliders: a medial mesh as shapes for collision detection, with the mass properties of the solid. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/json_text.h"
@@ -29,8 +28,8 @@ typedef struct medial_colliders_params {
   double least_radius, dent, hull_error, density;
 } medial_colliders_params;
 
-/* Rows of more shapes than this would cost engines more than they gain; their dents are deeper instead. */
-enum { MOST_IN_ROWS = 256 };
+/* More shapes than QMAT_MOST_IN_ROWS would cost engines more than they gain: dents become deeper instead, up to this.
+ * Beyond it only rows count, not all shapes: a medial mesh may have more simplices. */
 static const double deepest_dent = 0.1;
 
 typedef struct work {
@@ -62,32 +61,16 @@ static bool has_hulls_of_solid(const work *w) {
   return w->params->kind == KIND_HULLS && w->params->fit == FIT_CONTAIN && mesh->closed && mesh->oriented && !is_thick;
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  const double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
-/* Fitted shapes may have come apart into more than the budget. Joint shapes contain both, so that containing is still
- * proved; capsules do not come apart. Of shapes inside the solid the largest stay. */
+/* Fitted shapes come apart where a sphere of theirs has grown to contain another one, or has become too small: a hull
+ * of three spheres can become three capsules. Those that contain the solid are joined again by shapes that contain
+ * both, as capsules at most, which do not come apart. Those inside it cannot be joined: the largest stay. */
 static qmat_status keep_budget(work *w, double growth) {
   const medial_colliders_params *p = w->params;
-  qmat_shape_set *set = &w->set;
-  const size_t most = (size_t)p->shapes, count = set->shape_count;
-  if (most == 0 || count <= most || has_hulls_of_solid(w)) return QMAT_OK;
-  if (p->fit != FIT_INSIDE)
-    return qmat_shape_set_merge(w->context, set, kind_of(p) == QMAT_SHAPES_ANY ? QMAT_SHAPES_CAPSULES : kind_of(p),
-                                growth, most);
-  double *volumes = qmat_arena_alloc(&w->context->arena, 2 * count, sizeof *volumes), *sorted = volumes + count;
-  if (!volumes) return qmat_fail_memory(w->context, "the colliders");
-  for (size_t i = 0; i < count; i++) volumes[i] = qmat_shape_volume(set->spheres, &set->shapes[3 * i]);
-  memcpy(sorted, volumes, count * sizeof *sorted);
-  qsort(sorted, count, sizeof *sorted, compare_numbers);
-  size_t kept = 0;
-  for (size_t i = 0; i < count && kept < most; i++)
-    if (volumes[i] >= sorted[count - most])
-      memmove(&set->shapes[3 * kept++], &set->shapes[3 * i], 3 * sizeof *set->shapes);
-  set->shape_count = kept;
-  return qmat_shape_set_reduce(w->context, set);
+  const size_t most = (size_t)p->shapes;
+  if (most == 0 || has_hulls_of_solid(w)) return QMAT_OK;
+  if (p->fit == FIT_INSIDE) return qmat_shape_set_keep_largest(w->context, &w->set, most);
+  return qmat_shape_set_merge(w->context, &w->set, kind_of(p) == QMAT_SHAPES_ANY ? QMAT_SHAPES_CAPSULES : kind_of(p),
+                              growth, most);
 }
 
 /* Makes the spheres that shapes are made of: those of the medial mesh, divided where several joints move the surface.
@@ -112,8 +95,8 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
   for (w->dent = p->dent; status == QMAT_OK; w->dent *= 1.25) {
     const bool may_deepen = kind_of(p) != QMAT_SHAPES_ANY && w->dent < deepest_dent;
     status = qmat_shape_set_make(context, &unit, w->joints, p->least_radius, kind_of(p), w->dent,
-                                 may_deepen ? 4 * MOST_IN_ROWS : SIZE_MAX, &w->set);
-    if (!may_deepen || w->set.shape_count <= MOST_IN_ROWS) break;
+                                 may_deepen ? 4 * QMAT_MOST_IN_ROWS : SIZE_MAX, &w->set);
+    if (w->set.shape_count <= (may_deepen ? QMAT_MOST_IN_ROWS : SIZE_MAX - 1)) break;
   }
   static const double growth[] = {[FIT_BOTH] = 0.5, [FIT_CONTAIN] = 1, [FIT_INSIDE] = 0};
   if (status == QMAT_OK && p->shapes > 0 && !has_hulls_of_solid(w))

@@ -2,6 +2,7 @@
 #include "nodes/colliders/shape_merge.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/geometry/vector.h"
@@ -145,5 +146,45 @@ qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qma
       if (i == a || i == b || partners[i] == a || partners[i] == b || partners[i] == last || i < a || i < b)
         costs[i] = NAN;
   }
+  return qmat_shape_set_reduce(context, set);
+}
+
+/* A shape in the order in which shapes are kept. */
+typedef struct ranked_shape {
+  uint32_t group, id;
+  double volume;
+} ranked_shape;
+
+/* By groups; the largest of a group first, the first of equal ones. */
+static int compare_ranked(const void *left, const void *right) {
+  const ranked_shape *a = left, *b = right;
+  if (a->group != b->group) return a->group < b->group ? -1 : 1;
+  if (a->volume != b->volume) return a->volume > b->volume ? -1 : 1;
+  return a->id < b->id ? -1 : a->id > b->id;
+}
+
+qmat_status qmat_shape_set_keep_largest(qmat_context *context, qmat_shape_set *set, size_t most) {
+  const size_t count = set->shape_count;
+  if (count <= most) return QMAT_OK;
+  ranked_shape *order = qmat_arena_alloc(&context->arena, count, sizeof *order);
+  uint8_t *stays = qmat_arena_calloc(&context->arena, count, 1);
+  if (!order || !stays) return qmat_fail_memory(context, "the colliders");
+  for (size_t i = 0; i < count; i++) {
+    const uint32_t *ids = &set->shapes[3 * i];
+    order[i] = (ranked_shape){set->joints ? set->joints[ids[0]] : 0, (uint32_t)i, qmat_shape_volume(set->spheres, ids)};
+  }
+  qsort(order, count, sizeof *order, compare_ranked);
+  /* From joints to two groups: the largest shapes of joints, and all others. */
+  size_t kept = 0, joints = 0;
+  for (size_t i = 0; i < count; i++) {
+    const bool leads = i == 0 || !qmat_shape_set_same_joint(set, order[i].id, order[i - 1].id);
+    order[i].group = !leads;
+    joints += leads;
+  }
+  qsort(order, count, sizeof *order, compare_ranked);
+  for (size_t i = 0; i < count && (i < most || i < joints); i++) stays[order[i].id] = 1;
+  for (size_t i = 0; i < count; i++)
+    if (stays[i]) memmove(&set->shapes[3 * kept++], &set->shapes[3 * i], 3 * sizeof *set->shapes);
+  set->shape_count = kept;
   return qmat_shape_set_reduce(context, set);
 }

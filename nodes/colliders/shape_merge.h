@@ -11,4 +11,9 @@
 qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qmat_shape_kind kind, double growth,
                                  size_t most);
 
+/* Keeps the `most` largest shapes, by qmat_shape_volume, the first of equal ones. The largest shape of each joint stays
+ * always; where the set has more joints than `most`, only those do. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: a sort of
+ * the shapes, and that of qmat_shape_set_reduce. */
+qmat_status qmat_shape_set_keep_largest(qmat_context *context, qmat_shape_set *set, size_t most);
+
 #endif
