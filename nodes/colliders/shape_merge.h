@@ -6,8 +6,9 @@
 
 /* Joins pairs of shapes, the least growth of volume first, until at most `most` are left, or none has another one
  * of its joint. The shape for both is the hull of some of their spheres; `growth` times what the others leave it by is
- * added to its radii, so that 1 makes it contain both. QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: quadratic in the
- * shapes. */
+ * added to its radii, so that 1 makes it contain both. Pairs that touch come before others. QMAT_ERROR_MEMORY,
+ * QMAT_CANCELLED. One thread. Cost: the shapes times the pairs that each joint shape touches, and quadratic distances.
+ */
 qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qmat_shape_kind kind, double growth,
                                  size_t most);
 
