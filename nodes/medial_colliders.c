@@ -86,6 +86,31 @@ static qmat_status make_spheres(work *w, const qmat_mesh *mesh, const qmat_media
   return qmat_joint_points_divide(context, &w->skin, &whole, unit, &w->joints);
 }
 
+/* Fits shapes that were made of those given. A joint shape may be outside of the solid where those given were not: a
+ * joint that has lost all gets the largest of its shapes given that is inside. */
+static qmat_status fit_inside(work *w, const qmat_shape_set *given, double least_radius) {
+  qmat_context *context = w->context;
+  qmat_shape_set lost = {0};
+  qmat_status status = qmat_inside_fit(context, w->surface, &w->set, least_radius, &w->proved);
+  if (status == QMAT_OK && given->shape_count > 0) status = qmat_shape_set_find_lost(context, given, &w->set, &lost);
+  if (status != QMAT_OK || lost.shape_count == 0) return status;
+  status = qmat_inside_fit(context, w->surface, &lost, least_radius, &w->proved);
+  if (status == QMAT_OK) status = qmat_shape_set_keep_largest(context, &lost, 0);
+  return status == QMAT_OK ? qmat_shape_set_append(context, &w->set, &lost) : status;
+}
+
+/* Joins shapes until the budget is kept. `given`: those before, with all that they had; none where nothing changes. */
+static qmat_status join_shapes(work *w, double growth, qmat_shape_set *given) {
+  const size_t most = (size_t)w->params->shapes;
+  *given = (qmat_shape_set){0};
+  if (most == 0 || w->set.shape_count <= most || has_hulls_of_solid(w)) return QMAT_OK;
+  *given = w->set; /* the spheres and joints stay as they are */
+  given->shapes = qmat_arena_alloc(&w->context->arena, given->shape_count, 3 * sizeof *given->shapes);
+  if (!given->shapes) return qmat_fail_memory(w->context, "the colliders");
+  memcpy(given->shapes, w->set.shapes, 3 * given->shape_count * sizeof *given->shapes);
+  return qmat_shape_set_merge(w->context, &w->set, kind_of(w->params), growth, most);
+}
+
 static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial *medial) {
   const medial_colliders_params *p = w->params;
   qmat_context *context = w->context;
@@ -99,8 +124,8 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
     if (w->set.shape_count <= (may_deepen ? QMAT_MOST_IN_ROWS : SIZE_MAX - 1)) break;
   }
   static const double growth[] = {[FIT_BOTH] = 0.5, [FIT_CONTAIN] = 1, [FIT_INSIDE] = 0};
-  if (status == QMAT_OK && p->shapes > 0 && !has_hulls_of_solid(w))
-    status = qmat_shape_set_merge(context, &w->set, kind_of(p), growth[p->fit], (size_t)p->shapes);
+  qmat_shape_set given;
+  if (status == QMAT_OK) status = join_shapes(w, growth[p->fit], &given);
   /* The surface itself is known to the deviation. */
   const double deviation = mesh->deviation / qmat_surface_frame(w->surface)->diagonal;
   if (status == QMAT_OK && p->fit == FIT_CONTAIN) {
@@ -108,7 +133,7 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
     for (size_t i = 0; i < w->set.sphere_count; i++) w->set.spheres[4 * i + 3] += deviation;
   }
   if (status == QMAT_OK && p->fit == FIT_INSIDE) {
-    status = qmat_inside_fit(context, w->surface, &w->set, p->least_radius + deviation, &w->proved);
+    status = fit_inside(w, &given, p->least_radius + deviation);
     for (size_t i = 0; i < w->set.sphere_count; i++) w->set.spheres[4 * i + 3] -= deviation;
   }
   if (status == QMAT_OK) status = keep_budget(w, growth[p->fit]);

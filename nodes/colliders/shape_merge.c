@@ -115,9 +115,14 @@ static void find_partner(const merging *m, size_t i) {
       if (qmat_shape_set_same_joint(m->set, i, b) && (far == 1 || apart(m->set, i, b) <= 0)) offer(m, i, b, far == 1);
 }
 
+/* The joint that moves a shape; 0 where nothing is skinned. */
+static uint32_t joint_of(const qmat_shape_set *set, size_t shape) {
+  return set->joints ? set->joints[set->shapes[3 * shape]] : 0;
+}
+
 /* Replaces shapes a and b by their joint shape, in the place of a; the last shape moves to the place of b. */
 static void replace(qmat_shape_set *set, size_t a, size_t b, const pair *p) {
-  const uint32_t joint = set->joints ? set->joints[set->shapes[3 * a]] : 0;
+  const uint32_t joint = joint_of(set, a);
   for (int k = 0; k < 3; k++) {
     memcpy(&set->spheres[4 * (set->sphere_count + (size_t)k)], p->best[k], sizeof p->best[k]);
     if (set->joints) set->joints[set->sphere_count + (size_t)k] = joint;
@@ -182,6 +187,45 @@ qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qma
   return qmat_shape_set_reduce(context, set);
 }
 
+qmat_status qmat_shape_set_find_lost(qmat_context *context, const qmat_shape_set *given, const qmat_shape_set *set,
+                                     qmat_shape_set *lost) {
+  size_t joints = 0;
+  for (size_t i = 0; i < given->shape_count; i++)
+    if (joint_of(given, i) >= joints) joints = (size_t)joint_of(given, i) + 1;
+  uint8_t *has_shape = qmat_arena_calloc(&context->arena, joints, 1);
+  *lost = *given;
+  lost->shape_count = 0;
+  lost->shapes = qmat_arena_alloc(&context->arena, given->shape_count, 3 * sizeof *lost->shapes);
+  lost->spheres = qmat_arena_alloc(&context->arena, given->sphere_count, 4 * sizeof *lost->spheres);
+  if (!has_shape || !lost->shapes || !lost->spheres) return qmat_fail_memory(context, "the colliders");
+  memcpy(lost->spheres, given->spheres, 4 * given->sphere_count * sizeof *lost->spheres);
+  for (size_t i = 0; i < set->shape_count; i++) has_shape[joint_of(set, i)] = 1;
+  for (size_t i = 0; i < given->shape_count; i++)
+    if (!has_shape[joint_of(given, i)])
+      memcpy(&lost->shapes[3 * lost->shape_count++], &given->shapes[3 * i], 3 * sizeof *lost->shapes);
+  return QMAT_OK;
+}
+
+qmat_status qmat_shape_set_append(qmat_context *context, qmat_shape_set *set, const qmat_shape_set *other) {
+  const qmat_shape_set *const parts[] = {set, other};
+  const size_t spheres = set->sphere_count + other->sphere_count, shapes = set->shape_count + other->shape_count;
+  qmat_shape_set all = {.spheres = qmat_arena_alloc(&context->arena, spheres, 4 * sizeof *all.spheres),
+                        .shapes = qmat_arena_alloc(&context->arena, shapes, 3 * sizeof *all.shapes),
+                        .joints = set->joints ? qmat_arena_alloc(&context->arena, spheres, sizeof *all.joints) : NULL};
+  if (!all.spheres || !all.shapes || (set->joints && !all.joints)) return qmat_fail_memory(context, "the colliders");
+  for (int p = 0; p < 2; p++) {
+    for (size_t i = 0; i < 3 * parts[p]->shape_count; i++)
+      all.shapes[3 * all.shape_count + i] = parts[p]->shapes[i] + (uint32_t)all.sphere_count;
+    for (size_t i = 0; i < parts[p]->sphere_count; i++) {
+      if (all.joints) all.joints[all.sphere_count] = parts[p]->joints[i];
+      memcpy(&all.spheres[4 * all.sphere_count++], &parts[p]->spheres[4 * i], 4 * sizeof *all.spheres);
+    }
+    all.shape_count += parts[p]->shape_count;
+  }
+  *set = all;
+  return qmat_shape_set_reduce(context, set);
+}
+
 /* A shape in the order in which shapes are kept. */
 typedef struct ranked_shape {
   uint32_t group, id;
@@ -204,7 +248,7 @@ qmat_status qmat_shape_set_keep_largest(qmat_context *context, qmat_shape_set *s
   if (!order || !stays) return qmat_fail_memory(context, "the colliders");
   for (size_t i = 0; i < count; i++) {
     const uint32_t *ids = &set->shapes[3 * i];
-    order[i] = (ranked_shape){set->joints ? set->joints[ids[0]] : 0, (uint32_t)i, qmat_shape_volume(set->spheres, ids)};
+    order[i] = (ranked_shape){joint_of(set, i), (uint32_t)i, qmat_shape_volume(set->spheres, ids)};
   }
   qsort(order, count, sizeof *order, compare_ranked);
   /* From joints to two groups: the largest shapes of joints, and all others. */

@@ -564,6 +564,26 @@ static void test_budget_kind_and_hull_points_are_kept(void **state) {
   qmat_value_release(&medial->base);
 }
 
+/* Two boxes with a sphere each: the shape for both is outside of both. */
+static void test_a_budget_inside_the_solid_leaves_a_shape(void **state) {
+  (void)state;
+  static const char *const kinds[] = {"any", "capsules", "spheres", "hulls"};
+  static const double spheres[] = {0, 0, 0, 0.4, 5, 0, 0, 0.9};
+  for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+    char params[64];
+    snprintf(params, sizeof params, "fit=inside shapes=1 kind=%s", kinds[i]);
+    qmat_mesh *mesh = shape_box_around(0.5, 0.5, 0.5);
+    shape_add_box(mesh, 4, -1, -1, 6, 1, 1, false);
+    collider_run r = make_colliders(mesh, sealed_medial_mesh(spheres, 2, NULL, 0, NULL, 0), params, 2);
+    assert_int_equal(r.colliders->shape_count, 1);
+    const double *s = &r.colliders->spheres[4 * (size_t)r.colliders->shapes[0]]; /* the larger one */
+    assert_near(s[0], 5, 1e-9);
+    assert_true(s[3] > 0.9 && s[3] < 1 + 1e-6);
+    assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+    collider_run_free(&r);
+  }
+}
+
 /* The deepest dent between neighbours of equal spheres along x, which may come in any order. */
 static double deepest_dent(const qmat_colliders *c) {
   double most = 0;
@@ -641,6 +661,7 @@ int main(void) {
       cmocka_unit_test(test_a_sheet_without_area_has_a_hull),
       cmocka_unit_test(test_hulls_of_the_solid_contain_it),
       cmocka_unit_test(test_budget_kind_and_hull_points_are_kept),
+      cmocka_unit_test(test_a_budget_inside_the_solid_leaves_a_shape),
       cmocka_unit_test(test_dents_are_as_deep_as_the_report_says),
       cmocka_unit_test(test_one_two_and_eight_threads_make_the_same_bytes),
   };

@@ -132,11 +132,38 @@ static void test_a_joined_pair_leaves_the_other_pairs_known(void **state) {
   if (many > 32 * few + 0.1) fail_msg("%.3f s, after %.3f s", many, few);
 }
 
+/* Joint 2 has no shape left, and gets those given back. */
+static void test_the_shapes_of_a_lost_joint_come_back(void **state) {
+  (void)state;
+  qmat_context context = {0};
+  double spheres[] = {0, 0, 0, 0.1, 1, 0, 0, 0.1, 2, 0, 0, 0.1, 3, 0, 0, 0.1}, left[] = {5, 0, 0, 0.2};
+  uint32_t shapes[] = {2, 3, 3, 0, 0, 0, 1, 1, 1}, joints[] = {9, 9, 2, 2}, id[] = {0, 0, 0}, joint[] = {9};
+  const qmat_shape_set given = {4, 3, spheres, shapes, joints};
+  qmat_shape_set set = {1, 1, left, id, joint}, lost;
+  assert_int_equal(qmat_shape_set_find_lost(&context, &given, &set, &lost), QMAT_OK);
+  assert_int_equal(lost.shape_count, 1);
+  assert_memory_equal(lost.shapes, shapes, 3 * sizeof *shapes);
+  assert_int_equal(qmat_shape_set_append(&context, &set, &lost), QMAT_OK);
+  assert_int_equal(set.shape_count, 2);
+  assert_int_equal(set.sphere_count, 3);
+  assert_int_equal(qmat_shape_width(set.shapes), 2); /* wide ones come first */
+  for (size_t k = 0; k < 2; k++) {
+    assert_int_equal(set.joints[set.shapes[k]], 2);
+    assert_true(set.spheres[4 * (size_t)set.shapes[k]] == 2 + (double)k);
+  }
+  assert_int_equal(set.joints[set.shapes[3]], 9);
+  assert_true(set.spheres[4 * (size_t)set.shapes[3]] == 5);
+  assert_int_equal(qmat_shape_set_find_lost(&context, &given, &set, &lost), QMAT_OK);
+  assert_int_equal(lost.shape_count, 0);
+  qmat_context_uninit(&context);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_largest_stay_in_their_order),
       cmocka_unit_test(test_of_equal_shapes_the_first_stay_beside_larger_ones),
       cmocka_unit_test(test_each_joint_keeps_its_largest_shape),
+      cmocka_unit_test(test_the_shapes_of_a_lost_joint_come_back),
       cmocka_unit_test(test_the_cheapest_pair_is_joined_each_time),
       cmocka_unit_test(test_a_joined_pair_leaves_the_other_pairs_known),
   };
