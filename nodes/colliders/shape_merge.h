@@ -12,8 +12,9 @@
 qmat_status qmat_shape_set_merge(qmat_context *context, qmat_shape_set *set, qmat_shape_kind kind, double growth,
                                  size_t most);
 
-/* Finds the shapes of `given` whose joints have no shape in `set`; all of them where nothing is skinned and `set` is
- * empty. `lost` receives them with all spheres of `given`, in new arrays. QMAT_ERROR_MEMORY. Linear. */
+/* Finds the shapes of `given` whose joints have no shape in `set`, which was made of it; all of them where nothing is
+ * skinned and `set` is empty. `lost` receives them with all spheres of `given`, in new arrays, and its joints.
+ * QMAT_ERROR_MEMORY. Linear. */
 qmat_status qmat_shape_set_find_lost(qmat_context *context, const qmat_shape_set *given, const qmat_shape_set *set,
                                      qmat_shape_set *lost);
 
