@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* medial.colliders: a medial mesh as shapes for collision detection, with the mass properties of the solid. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/json_text.h"
@@ -29,8 +28,8 @@ typedef struct medial_colliders_params {
   double least_radius, dent, hull_error, density;
 } medial_colliders_params;
 
-/* Rows of more shapes than this would cost engines more than they gain; their dents are deeper instead. */
-enum { MOST_IN_ROWS = 256 };
+/* More shapes than QMAT_MOST_IN_ROWS would cost engines more than they gain: dents become deeper instead, up to this.
+ * Beyond it only rows count, not all shapes: a medial mesh may have more simplices. */
 static const double deepest_dent = 0.1;
 
 typedef struct work {
@@ -62,32 +61,16 @@ static bool has_hulls_of_solid(const work *w) {
   return w->params->kind == KIND_HULLS && w->params->fit == FIT_CONTAIN && mesh->closed && mesh->oriented && !is_thick;
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  const double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
-/* Fitted shapes may have come apart into more than the budget. Joint shapes contain both, so that containing is still
- * proved; capsules do not come apart. Of shapes inside the solid the largest stay. */
+/* Fitted shapes come apart where a sphere of theirs has grown to contain another one, or has become too small: a hull
+ * of three spheres can become three capsules. Those that contain the solid are joined again by shapes that contain
+ * both, as capsules at most, which do not come apart. Those inside it cannot be joined: the largest stay. */
 static qmat_status keep_budget(work *w, double growth) {
   const medial_colliders_params *p = w->params;
-  qmat_shape_set *set = &w->set;
-  const size_t most = (size_t)p->shapes, count = set->shape_count;
-  if (most == 0 || count <= most || has_hulls_of_solid(w)) return QMAT_OK;
-  if (p->fit != FIT_INSIDE)
-    return qmat_shape_set_merge(w->context, set, kind_of(p) == QMAT_SHAPES_ANY ? QMAT_SHAPES_CAPSULES : kind_of(p),
-                                growth, most);
-  double *volumes = qmat_arena_alloc(&w->context->arena, 2 * count, sizeof *volumes), *sorted = volumes + count;
-  if (!volumes) return qmat_fail_memory(w->context, "the colliders");
-  for (size_t i = 0; i < count; i++) volumes[i] = qmat_shape_volume(set->spheres, &set->shapes[3 * i]);
-  memcpy(sorted, volumes, count * sizeof *sorted);
-  qsort(sorted, count, sizeof *sorted, compare_numbers);
-  size_t kept = 0;
-  for (size_t i = 0; i < count && kept < most; i++)
-    if (volumes[i] >= sorted[count - most])
-      memmove(&set->shapes[3 * kept++], &set->shapes[3 * i], 3 * sizeof *set->shapes);
-  set->shape_count = kept;
-  return qmat_shape_set_reduce(w->context, set);
+  const size_t most = (size_t)p->shapes;
+  if (most == 0 || has_hulls_of_solid(w)) return QMAT_OK;
+  if (p->fit == FIT_INSIDE) return qmat_shape_set_keep_largest(w->context, &w->set, most);
+  return qmat_shape_set_merge(w->context, &w->set, kind_of(p) == QMAT_SHAPES_ANY ? QMAT_SHAPES_CAPSULES : kind_of(p),
+                              growth, most);
 }
 
 /* Makes the spheres that shapes are made of: those of the medial mesh, divided where several joints move the surface.
@@ -103,6 +86,31 @@ static qmat_status make_spheres(work *w, const qmat_mesh *mesh, const qmat_media
   return qmat_joint_points_divide(context, &w->skin, &whole, unit, &w->joints);
 }
 
+/* Fits shapes that were made of those given. A joint shape may be outside of the solid where those given were not: a
+ * joint that has lost all gets the largest of its shapes given that is inside. */
+static qmat_status fit_inside(work *w, const qmat_shape_set *given, double least_radius) {
+  qmat_context *context = w->context;
+  qmat_shape_set lost = {0};
+  qmat_status status = qmat_inside_fit(context, w->surface, &w->set, least_radius, &w->proved);
+  if (status == QMAT_OK && given->shape_count > 0) status = qmat_shape_set_find_lost(context, given, &w->set, &lost);
+  if (status != QMAT_OK || lost.shape_count == 0) return status;
+  status = qmat_inside_fit(context, w->surface, &lost, least_radius, &w->proved);
+  if (status == QMAT_OK) status = qmat_shape_set_keep_largest(context, &lost, 0);
+  return status == QMAT_OK ? qmat_shape_set_append(context, &w->set, &lost) : status;
+}
+
+/* Joins shapes until the budget is kept. `given`: those before, with all that they had; none where nothing changes. */
+static qmat_status join_shapes(work *w, double growth, qmat_shape_set *given) {
+  const size_t most = (size_t)w->params->shapes;
+  *given = (qmat_shape_set){0};
+  if (most == 0 || w->set.shape_count <= most || has_hulls_of_solid(w)) return QMAT_OK;
+  *given = w->set; /* the spheres and joints stay as they are */
+  given->shapes = qmat_arena_alloc(&w->context->arena, given->shape_count, 3 * sizeof *given->shapes);
+  if (!given->shapes) return qmat_fail_memory(w->context, "the colliders");
+  memcpy(given->shapes, w->set.shapes, 3 * given->shape_count * sizeof *given->shapes);
+  return qmat_shape_set_merge(w->context, &w->set, kind_of(w->params), growth, most);
+}
+
 static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial *medial) {
   const medial_colliders_params *p = w->params;
   qmat_context *context = w->context;
@@ -112,12 +120,12 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
   for (w->dent = p->dent; status == QMAT_OK; w->dent *= 1.25) {
     const bool may_deepen = kind_of(p) != QMAT_SHAPES_ANY && w->dent < deepest_dent;
     status = qmat_shape_set_make(context, &unit, w->joints, p->least_radius, kind_of(p), w->dent,
-                                 may_deepen ? 4 * MOST_IN_ROWS : SIZE_MAX, &w->set);
-    if (!may_deepen || w->set.shape_count <= MOST_IN_ROWS) break;
+                                 may_deepen ? 4 * QMAT_MOST_IN_ROWS : SIZE_MAX, &w->set);
+    if (w->set.shape_count <= (may_deepen ? QMAT_MOST_IN_ROWS : SIZE_MAX - 1)) break;
   }
   static const double growth[] = {[FIT_BOTH] = 0.5, [FIT_CONTAIN] = 1, [FIT_INSIDE] = 0};
-  if (status == QMAT_OK && p->shapes > 0 && !has_hulls_of_solid(w))
-    status = qmat_shape_set_merge(context, &w->set, kind_of(p), growth[p->fit], (size_t)p->shapes);
+  qmat_shape_set given;
+  if (status == QMAT_OK) status = join_shapes(w, growth[p->fit], &given);
   /* The surface itself is known to the deviation. */
   const double deviation = mesh->deviation / qmat_surface_frame(w->surface)->diagonal;
   if (status == QMAT_OK && p->fit == FIT_CONTAIN) {
@@ -125,7 +133,7 @@ static qmat_status make_shapes(work *w, const qmat_mesh *mesh, const qmat_medial
     for (size_t i = 0; i < w->set.sphere_count; i++) w->set.spheres[4 * i + 3] += deviation;
   }
   if (status == QMAT_OK && p->fit == FIT_INSIDE) {
-    status = qmat_inside_fit(context, w->surface, &w->set, p->least_radius + deviation, &w->proved);
+    status = fit_inside(w, &given, p->least_radius + deviation);
     for (size_t i = 0; i < w->set.sphere_count; i++) w->set.spheres[4 * i + 3] -= deviation;
   }
   if (status == QMAT_OK) status = keep_budget(w, growth[p->fit]);
@@ -332,7 +340,8 @@ const qmat_node qmat_node_medial_colliders = {
         "bound then proves that no point of the solid is outside, and spheres grow where one is. Hulls contain their "
         "shapes.\n\n"
         "fit=inside: radii change, and the proof is the opposite one: no point of a shape is outside of the solid. "
-        "Hulls are inside their shapes, as with fit=both. proved is false for open surfaces.\n\n"
+        "Where that leaves more than `shapes`, the largest stay, one of each joint at least. Hulls are inside their "
+        "shapes, as with fit=both. proved is false for open surfaces.\n\n"
         "kind=hulls (with contain): the solid is divided among the shapes, and each hull contains only its part. Hulls "
         "are joined where the facets between both leave the solid by at most hull_error, or until `shapes` are left. "
         "Then one is divided by a plane and two others are joined, as long as the union's volume falls and the facets "

@@ -103,33 +103,6 @@ static qmat_status take_samples(fit *t) {
 
 /* ---- one step ---- */
 
-/* The shape of a joint that is nearest to a point, and its signed distance; INFINITY: the joint has none. */
-static double nearest_of_joint(const fit *t, uint32_t joint, const double point[3], size_t *nearest) {
-  const qmat_shape_set *set = t->set;
-  double least = INFINITY;
-  for (size_t i = 0; i < set->shape_count; i++) {
-    if (set->joints[set->shapes[3 * i]] != joint) continue;
-    const double distance = qmat_shape_distance(&t->shapes[i], point, NULL);
-    if (!(distance < least)) continue;
-    least = distance;
-    *nearest = i;
-  }
-  return least;
-}
-
-/* The same as qmat_envelope_nearest, among the shapes of a joint. */
-static double medial_of_joint(const fit *t, uint32_t joint, const double point[3], size_t *nearest, double medial[4]) {
-  const double distance = nearest_of_joint(t, joint, point, nearest);
-  const uint32_t *ids = &t->set->shapes[3 * *nearest];
-  double shares[3];
-  qmat_shape_distance(&t->shapes[*nearest], point, shares);
-  for (int k = 0; k < 4; k++) {
-    medial[k] = 0;
-    for (int s = 0; s < 3; s++) medial[k] += shares[s] * t->set->spheres[4 * (size_t)ids[s] + (size_t)k];
-  }
-  return distance;
-}
-
 /* Fills the rows. `*slack` becomes the mean of -F over the even samples, `*outside` the largest F. */
 static qmat_status evaluate(fit *t, double *slack, double *outside) {
   const qmat_shape_set *set = t->set;
@@ -144,9 +117,10 @@ static qmat_status evaluate(fit *t, double *slack, double *outside) {
     const double *point = &t->samples[4 * i];
     double medial[4];
     size_t primitive = 0;
-    r->f = point[3] + (t->joints ? medial_of_joint(t, t->joints[i], point, &primitive, medial)
+    r->f = point[3] + (t->joints ? qmat_shape_set_nearest_of_joint(set, t->shapes, t->joints[i], point, &primitive)
                                  : qmat_envelope_nearest(envelope, point, &primitive, medial));
     memcpy(r->ids, &set->shapes[3 * primitive], sizeof r->ids);
+    if (t->joints) qmat_shape_medial(&t->shapes[primitive], set->spheres, r->ids, point, medial);
     qmat_shape_distance(&t->shapes[primitive], point, r->shares);
     const double away = qmat_point_distance(point, medial);
     for (int k = 0; k < 3; k++) r->normal[k] = away > 0 ? (point[k] - medial[k]) / away : 0;
@@ -292,7 +266,8 @@ static void grow_joints(fit *t) {
   for (size_t i = 0; t->skin && i < t->skin->count; i++) {
     const double *point = &t->skin->points[4 * i];
     size_t nearest = 0;
-    const double left = nearest_of_joint(t, t->skin->joints[i], point, &nearest) + point[3] + 1e-6;
+    const double left =
+        qmat_shape_set_nearest_of_joint(t->set, t->shapes, t->skin->joints[i], point, &nearest) + point[3] + 1e-6;
     if (!(left > 0) || !isfinite(left)) continue;
     grow_at(t->set, (uint32_t)nearest, point, left);
     qmat_shape_prepare(&t->shapes[nearest], t->set->spheres, &t->set->shapes[3 * nearest]);

@@ -478,8 +478,9 @@ static qmat_status make_hulls(merging *m) {
 
 /* Writes the hulls. */
 static qmat_status write_hulls(merging *m, qmat_colliders *c) {
-  const size_t room = m->live_count * m->most_points;
+  size_t room = 0;
   qmat_status status = QMAT_OK;
+  for (size_t i = 0; i < m->live_count; i++) room += m->ends[i].count;
   double *points = qmat_alloc(room, 3 * sizeof *points);
   uint32_t *triangles = qmat_alloc(room, 6 * sizeof *triangles);
   uint32_t *shapes = qmat_alloc(m->live_count, 3 * sizeof *shapes);

@@ -6,6 +6,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/context.h"
+
+/* Whether to go on fitting a hull: QMAT_CANCELLED as of qmat_progress, else QMAT_OK, which it is for no context (NULL).
+ */
+static inline qmat_status qmat_hull_go_on(qmat_context *context) {
+  return context ? qmat_progress(context, 1, 0, "hulls fitted") : QMAT_OK;
+}
+
 /* Keeps those of `count` points (3 doubles each) that are corners of the triangles of their hull (3 ids each), in their
  * order. Returns their number. `is_vertex` is scratch, one per point. Linear. */
 size_t qmat_hull_vertices_keep(double *points, size_t count, const uint32_t *triangles, size_t triangle_count,

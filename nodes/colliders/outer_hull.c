@@ -196,18 +196,13 @@ static void forget(qmat_outer_hull *hull, uint32_t vertex) {
   } while (o != hull->leaving[vertex]);
 }
 
-/* Whether to go on. */
-static qmat_status ask(const qmat_outer_hull *hull) {
-  return hull->context ? qmat_progress(hull->context, 1, 0, "hulls fitted") : QMAT_OK;
-}
-
 /* Moves each vertex by a share of the way to where the volume is least. How much that gains. */
 static double sweep(qmat_outer_hull *hull, double step, qmat_status *status) {
   double gain = 0;
   for (uint32_t v = 0; v < hull->point_count; v++) {
     uint32_t ring[MOST_AROUND];
     program p;
-    *status = ask(hull);
+    *status = qmat_hull_go_on(hull->context);
     if (*status != QMAT_OK) break;
     if (hull->leaving[v] == none) continue;
     const size_t count = find_ring(hull, v, ring);
@@ -307,7 +302,7 @@ static qmat_status choose(qmat_outer_hull *hull, double error, size_t *triangles
   qmat_growing_hull grown = {0};
   qmat_status status;
   do {
-    status = ask(hull);
+    status = qmat_hull_go_on(hull->context);
     if (status == QMAT_OK)
       status = qmat_growing_hull_of(&grown, hull->points, hull->point_count, hull->triangles, triangles);
   } while (status == QMAT_OK && add_points(hull, *triangles, error) > 0);

@@ -104,9 +104,14 @@ static qmat_status surround(hull *h, qmat_tangent_hull *tangent, const double *s
   return close_hull(h);
 }
 
-/* Appends the hull to the value's arrays, which have room for it. */
-static void append(qmat_colliders *colliders, size_t shape, const hull *h) {
+/* Appends the hull to the value's arrays, which have `room` for points and triangles. Most hulls have fewer than they
+ * may have, so that the arrays grow with them. */
+static qmat_status append(qmat_colliders *colliders, size_t room[2], size_t shape, const hull *h) {
   const size_t first = colliders->point_count;
+  if (qmat_grow((void **)&colliders->points, &room[0], first + h->used, 3 * sizeof *colliders->points) != 0 ||
+      qmat_grow((void **)&colliders->triangles, &room[1], colliders->triangle_count + h->triangle_count,
+                3 * sizeof *colliders->triangles) != 0)
+    return QMAT_ERROR_MEMORY;
   for (size_t i = 0; i < h->point_count; i++)
     if (h->names[i] != QMAT_UNUSED)
       memcpy(&colliders->points[3 * (first + h->names[i])], &h->points[3 * i], 3 * sizeof *h->points);
@@ -116,6 +121,7 @@ static void append(qmat_colliders *colliders, size_t shape, const hull *h) {
   colliders->triangle_count += h->triangle_count;
   colliders->hull_ends[2 * shape] = (uint32_t)colliders->point_count;
   colliders->hull_ends[2 * shape + 1] = (uint32_t)colliders->triangle_count;
+  return QMAT_OK;
 }
 
 qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, size_t most_points, double error,
@@ -125,11 +131,9 @@ qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, s
             .triangles = qmat_arena_alloc(&context->arena, room, 6 * sizeof *h.triangles),
             .names = qmat_arena_alloc(&context->arena, room, sizeof *h.names)};
   double *factors = qmat_arena_calloc(&context->arena, most_points + 1, sizeof *factors); /* 0: not known */
-  colliders->points = qmat_alloc(count * most_points, 3 * sizeof *colliders->points);
-  colliders->triangles = qmat_alloc(count * most_points, 6 * sizeof *colliders->triangles);
+  size_t value_room[2] = {0, 0};
   colliders->hull_ends = qmat_alloc(count, 2 * sizeof *colliders->hull_ends);
-  if (!h.points || !h.triangles || !h.names || !factors || !colliders->points || !colliders->triangles ||
-      !colliders->hull_ends)
+  if (!h.points || !h.triangles || !h.names || !factors || !colliders->hull_ends)
     return qmat_fail_memory(context, "the hulls");
   qmat_tangent_hull tangent;
   qmat_status status = qmat_tangent_hull_init(context, most_points, &tangent);
@@ -139,7 +143,7 @@ qmat_status qmat_shape_hulls(qmat_context *context, qmat_colliders *colliders, s
     const uint32_t *ids = &colliders->shapes[3 * i];
     status = side == QMAT_HULL_OUTSIDE ? surround(&h, &tangent, colliders->spheres, ids, error, factors)
                                        : fit_points(&h, colliders->spheres, ids, most_points, error, side, factors);
-    if (status == QMAT_OK) append(colliders, i, &h);
+    if (status == QMAT_OK) status = append(colliders, value_room, i, &h);
     if (status == QMAT_ERROR_GEOMETRY) {
       qmat_fail(context, status, "it has no hull");
       return qmat_fail_element(context, "shape", (int64_t)i);

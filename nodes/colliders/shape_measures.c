@@ -72,7 +72,7 @@ static double gap_at(const measuring *m, size_t i) {
 /* How far a point of the shapes' boundary is outside: a point of a hull, taken to the boundary of its shape. NAN inside
  * another shape. */
 static double protrusion_at(const measuring *m, size_t i) {
-  double point[3], weights[3], medial[4] = {0};
+  double point[3], medial[4];
   const size_t triangle = sample_point(m, i, 2, point);
   size_t low = 0, high = m->set->shape_count - 1;
   while (low < high) {
@@ -85,9 +85,7 @@ static double protrusion_at(const measuring *m, size_t i) {
   const uint32_t *ids = &m->set->shapes[3 * low];
   qmat_prepared_shape shape;
   qmat_shape_prepare(&shape, m->set->spheres, ids);
-  qmat_shape_distance(&shape, point, weights);
-  for (int s = 0; s < shape.count; s++)
-    for (int k = 0; k < 4; k++) medial[k] += weights[s] * m->set->spheres[4 * (size_t)ids[s] + (size_t)k];
+  qmat_shape_medial(&shape, m->set->spheres, ids, point, medial);
   const double away = qmat_point_distance(point, medial);
   if (!(away > 0)) return NAN;
   for (int k = 0; k < 3; k++) point[k] = medial[k] + medial[3] / away * (point[k] - medial[k]);

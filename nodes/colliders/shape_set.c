@@ -8,8 +8,6 @@
 #include "core/geometry/morton.h"
 #include "core/geometry/vector.h"
 
-enum { MOST_ROWS = 64 };
-
 int qmat_shape_width(const uint32_t shape[3]) {
   return shape[1] == shape[0] ? 1 : shape[2] == shape[1] ? 2 : 3;
 }
@@ -32,6 +30,17 @@ double qmat_shape_distance(const qmat_prepared_shape *shape, const double point[
   return shape->count == 3   ? qmat_slab_foot(&shape->slab, point, weights)
          : shape->count == 2 ? qmat_cone_foot(&shape->cone, point, weights)
                              : qmat_sphere_distance(shape->sphere, point);
+}
+
+double qmat_shape_medial(const qmat_prepared_shape *shape, const double *spheres, const uint32_t ids[3],
+                         const double point[3], double medial[4]) {
+  double weights[3];
+  const double distance = qmat_shape_distance(shape, point, weights);
+  for (int k = 0; k < 4; k++) {
+    medial[k] = 0;
+    for (int s = 0; s < shape->count; s++) medial[k] += weights[s] * spheres[4 * (size_t)ids[s] + (size_t)k];
+  }
+  return distance;
 }
 
 double qmat_shape_volume(const double *spheres, const uint32_t ids[3]) {
@@ -64,6 +73,19 @@ bool qmat_shape_set_same_joint(const qmat_shape_set *set, size_t a, size_t b) {
   return !set->joints || set->joints[set->shapes[3 * a]] == set->joints[set->shapes[3 * b]];
 }
 
+double qmat_shape_set_nearest_of_joint(const qmat_shape_set *set, const qmat_prepared_shape *shapes, uint32_t joint,
+                                       const double point[3], size_t *nearest) {
+  double least = INFINITY;
+  for (size_t i = 0; i < set->shape_count; i++) {
+    if (set->joints[set->shapes[3 * i]] != joint) continue;
+    const double distance = qmat_shape_distance(&shapes[i], point, NULL);
+    if (!(distance < least)) continue;
+    least = distance;
+    *nearest = i;
+  }
+  return least;
+}
+
 /* ---- a growing set ---- */
 
 typedef struct builder {
@@ -72,7 +94,8 @@ typedef struct builder {
   size_t sphere_room, shape_room;
   bool has_joints;
   uint32_t joint; /* of the spheres that are added */
-  bool failed;
+  size_t most;    /* shapes */
+  bool failed, too_many;
 } builder;
 
 static uint32_t add_sphere(builder *b, const double sphere[4]) {
@@ -92,9 +115,10 @@ static uint32_t add_sphere(builder *b, const double sphere[4]) {
 
 /* Adds a shape; ids in any order, equal ones for fewer spheres. */
 static void add_shape(builder *b, uint32_t x, uint32_t y, uint32_t z) {
+  b->too_many = b->too_many || b->set.shape_count == b->most;
   b->failed = b->failed || qmat_arena_grow(&b->context->arena, (void **)&b->set.shapes, &b->shape_room,
                                            b->set.shape_count + 1, 3 * sizeof *b->set.shapes);
-  if (b->failed) return;
+  if (b->failed || b->too_many) return;
   uint32_t ids[3] = {x, y, z};
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++)
@@ -113,12 +137,13 @@ static void interpolate(const double *a, const double *b, double t, double spher
 
 /* Where neighbours of a row from sphere s to t are, as shares of the way, so that the dents between them are at most
  * `dent` deep: at[0] = 0 to at[n] = 1. Where the row is thin they are closer; thinner than a dent does not count. The
- * number of steps n. */
-static int place_along(const double s[4], const double t[4], double dent, double at[MOST_ROWS + 1]) {
+ * number of steps n, or 0 where it would be above QMAT_MOST_IN_ROWS. */
+static int place_along(const double s[4], const double t[4], double dent, double at[QMAT_MOST_IN_ROWS + 1]) {
   const double length = qmat_point_distance(s, t);
   int count = 0;
   at[0] = 0;
-  while (at[count] < 1 && count < MOST_ROWS) {
+  while (at[count] < 1) {
+    if (count == QMAT_MOST_IN_ROWS) return 0;
     double step = 1;
     for (int k = 0; k < 2; k++) { /* at the nearer end, then at the thinner one */
       const double next = fmin(at[count] + step, 1), here = s[3] + at[count] * (t[3] - s[3]);
@@ -135,11 +160,12 @@ static int place_along(const double s[4], const double t[4], double dent, double
 
 /* Spheres along the cone of two, without those at its ends. */
 static void add_spheres_between(builder *b, const double *s, const double *t, double dent) {
-  double first[4], last[4], sphere[4], at[MOST_ROWS + 1];
+  double first[4], last[4], sphere[4], at[QMAT_MOST_IN_ROWS + 1];
   memcpy(first, s, sizeof first); /* the array may move */
   memcpy(last, t, sizeof last);
   const int steps = place_along(first, last, dent, at);
-  for (int i = 1; i < steps && !b->failed; i++) {
+  b->too_many = b->too_many || steps == 0;
+  for (int i = 1; i < steps && !b->failed && !b->too_many; i++) {
     interpolate(first, last, at[i], sphere);
     const uint32_t id = add_sphere(b, sphere);
     add_shape(b, id, id, id);
@@ -160,9 +186,10 @@ static void add_rows(builder *b, const uint32_t ids[3], qmat_shape_kind kind, do
   qmat_cross(u, v, normal);
   const double side = sqrt(qmat_dot(u, u)), height = side > 0 ? sqrt(qmat_dot(normal, normal)) / side : 0;
   const double base[4] = {0, 0, 0, fmin(p[3], q[3])}, top[4] = {height, 0, 0, apex[3]};
-  double at[MOST_ROWS + 1];
+  double at[QMAT_MOST_IN_ROWS + 1];
   const int rows = place_along(base, top, dent, at);
-  for (int i = 0; i <= rows && !b->failed; i++) {
+  b->too_many = b->too_many || rows == 0;
+  for (int i = 0; i <= rows && !b->failed && !b->too_many; i++) {
     const bool first = i == 0;
     double left[4], right[4];
     interpolate(p, apex, at[i], left);
@@ -222,17 +249,14 @@ static bool holds(const qmat_prepared_shape *outer, const double *spheres, const
 /* A box around a shape is larger by this, so that it holds the centres of all spheres that the shape holds. */
 static const double around_shape = 1e-9;
 
-/* Shapes that hold others. */
+/* Shapes, and those found to be inside others. */
 typedef struct nesting {
-  qmat_context *context;
   const qmat_shape_set *set;
   qmat_prepared_shape *prepared;
   uint8_t *dropped;
-  uint32_t *holders; /* pairs: a shape, and a later one that holds it; on the heap */
-  size_t count, capacity;
   qmat_curve_item *order;
   double (*boxes)[6];
-  size_t group_count; /* a power of two */
+  size_t leaf_count;
 } nesting;
 
 /* The box of a shape: the least x, y, z, then the largest. */
@@ -253,103 +277,79 @@ static const double *centre_of(const qmat_shape_set *set, size_t shape) {
   return &set->spheres[4 * (size_t)set->shapes[3 * shape]];
 }
 
-/* So many shapes share a box of their centres. */
-enum { GROUP_SIZE = 8 };
+/* Leaves of the tree have so many shapes at most. */
+enum { LEAF_SIZE = 8 };
 
-/* Makes the tree: shapes along a curve through their first centres, and the boxes of groups of them. Node 1 is the
- * root; the children of k are 2 k and 2 k + 1. */
-static bool make_groups(nesting *n) {
+/* Makes the tree (qmat_curve_node_items): the boxes of the first centres of shapes. */
+static bool make_tree(qmat_arena *arena, nesting *n) {
   const size_t count = n->set->shape_count;
-  n->group_count = 1;
-  while (n->group_count * GROUP_SIZE < count) n->group_count *= 2;
-  n->order = qmat_arena_alloc(&n->context->arena, count, sizeof *n->order);
-  n->boxes = qmat_arena_alloc(&n->context->arena, 2 * n->group_count, sizeof *n->boxes);
+  n->leaf_count = 1;
+  while (n->leaf_count * LEAF_SIZE < count) n->leaf_count *= 2;
+  n->order = qmat_arena_alloc(arena, count, sizeof *n->order);
+  n->boxes = qmat_arena_alloc(arena, 2 * n->leaf_count, sizeof *n->boxes);
   if (!n->order || !n->boxes) return false;
   for (size_t i = 0; i < count; i++)
     n->order[i] = (qmat_curve_item){qmat_curve_code(centre_of(n->set, i)), (uint32_t)i};
   qmat_curve_sort(n->order, count);
-  for (size_t g = 2 * n->group_count; g-- > 1;)
+  for (size_t node = 2 * n->leaf_count; node-- > 1;)
     for (size_t k = 0; k < 3; k++) {
       double low = INFINITY, high = -INFINITY;
-      for (size_t c = 0; c < 2 && g < n->group_count; c++) {
-        low = fmin(low, n->boxes[2 * g + c][k]);
-        high = fmax(high, n->boxes[2 * g + c][3 + k]);
+      for (size_t c = 0; c < 2 && node < n->leaf_count; c++) {
+        low = fmin(low, n->boxes[2 * node + c][k]);
+        high = fmax(high, n->boxes[2 * node + c][3 + k]);
       }
-      const size_t first = (g - n->group_count) * GROUP_SIZE;
-      for (size_t i = first; g >= n->group_count && i < first + GROUP_SIZE && i < count; i++) {
+      size_t i = 0, end = 0;
+      if (node >= n->leaf_count) qmat_curve_node_items(count, n->leaf_count, node, &i, &end);
+      for (; i < end; i++) {
         low = fmin(low, centre_of(n->set, n->order[i].id)[k]);
         high = fmax(high, centre_of(n->set, n->order[i].id)[k]);
       }
-      n->boxes[g][k] = low;
-      n->boxes[g][3 + k] = high;
+      n->boxes[node][k] = low;
+      n->boxes[node][3 + k] = high;
     }
   return true;
 }
 
-/* Looks whether a shape whose box may hold the centre of another one holds it all. */
-static qmat_status note_holder(nesting *n, uint32_t inner, uint32_t outer) {
-  if (inner == outer || n->dropped[inner]) return QMAT_OK;
-  if (!qmat_shape_set_same_joint(n->set, inner, outer) ||
-      !holds(&n->prepared[outer], n->set->spheres, &n->set->shapes[3 * (size_t)inner]))
-    return QMAT_OK;
-  if (outer < inner) {
-    n->dropped[inner] = 1; /* later ones are dropped first */
-    return QMAT_OK;
-  }
-  if (qmat_grow((void **)&n->holders, &n->capacity, 2 * n->count + 2, sizeof *n->holders) != 0)
-    return qmat_fail_memory(n->context, "the colliders");
-  n->holders[2 * n->count] = inner;
-  n->holders[2 * n->count++ + 1] = outer;
-  return QMAT_OK;
-}
-
-/* Tests the shapes below a node whose centres may be in the box of shape `outer`. */
-static qmat_status search_group(nesting *n, size_t node, const double box[6], uint32_t outer) {
+/* Drops the shapes below a node that shape `outer` holds. Their centres are in its box. */
+static void drop_below(nesting *n, size_t node, const double box[6], size_t outer) {
   const double *own = n->boxes[node];
   for (int k = 0; k < 3; k++)
-    if (own[k] > box[3 + k] || own[3 + k] < box[k]) return QMAT_OK;
-  qmat_status status = QMAT_OK;
-  if (node < n->group_count) {
-    for (size_t c = 0; c < 2 && status == QMAT_OK; c++) status = search_group(n, 2 * node + c, box, outer);
-    return status;
+    if (own[k] > box[3 + k] || own[3 + k] < box[k]) return;
+  if (node < n->leaf_count) {
+    drop_below(n, 2 * node, box, outer);
+    drop_below(n, 2 * node + 1, box, outer);
+    return;
   }
-  const size_t first = (node - n->group_count) * GROUP_SIZE;
-  for (size_t i = first; i < first + GROUP_SIZE && i < n->set->shape_count && status == QMAT_OK; i++)
-    status = note_holder(n, n->order[i].id, outer);
-  return status;
+  size_t i, end;
+  for (qmat_curve_node_items(n->set->shape_count, n->leaf_count, node, &i, &end); i < end; i++) {
+    const size_t inner = n->order[i].id;
+    n->dropped[inner] = n->dropped[inner] || (inner != outer && qmat_shape_set_same_joint(n->set, inner, outer) &&
+                                              holds(&n->prepared[outer], n->set->spheres, &n->set->shapes[3 * inner]));
+  }
 }
 
-static int compare_holders(const void *left, const void *right) {
-  const uint32_t *a = left, *b = right;
-  if (a[0] != b[0]) return a[0] > b[0] ? -1 : 1;
-  return (a[1] > b[1]) - (a[1] < b[1]);
-}
-
-/* Marks the shapes that are inside another one; of equal ones the first stays. The last is looked at first: one that is
- * dropped holds no other. */
+/* Marks the shapes that are inside another one; of equal ones the first stays. One that is dropped drops no other: what
+ * it holds is also inside the shape that holds it. */
 static qmat_status mark_nested(qmat_context *context, const qmat_shape_set *set, uint8_t *dropped) {
   const size_t count = set->shape_count;
-  nesting n = {.context = context, .set = set, .dropped = dropped};
+  nesting n = {.set = set, .dropped = dropped};
   if (count < 2) return QMAT_OK;
   n.prepared = qmat_arena_alloc(&context->arena, count, sizeof *n.prepared);
-  if (!n.prepared || !make_groups(&n)) return qmat_fail_memory(context, "the colliders");
+  if (!n.prepared || !make_tree(&context->arena, &n)) return qmat_fail_memory(context, "the colliders");
   for (size_t i = 0; i < count; i++) qmat_shape_prepare(&n.prepared[i], set->spheres, &set->shapes[3 * i]);
-  qmat_status status = QMAT_OK;
-  for (size_t i = 0; i < count && status == QMAT_OK; i++) {
+  for (size_t i = 0; i < count; i++) {
+    const qmat_status status = qmat_progress(context, i, count, "shapes compared");
     double box[6];
+    if (status != QMAT_OK) return status;
     box_of(set, i, box);
-    status = qmat_progress(context, i, count, "shapes compared");
-    if (status == QMAT_OK) status = search_group(&n, 1, box, (uint32_t)i);
+    if (!dropped[i]) drop_below(&n, 1, box, i);
   }
-  if (status == QMAT_OK && n.count > 0) qsort(n.holders, n.count, 2 * sizeof *n.holders, compare_holders);
-  for (size_t i = 0; i < n.count && status == QMAT_OK; i++)
-    if (!dropped[n.holders[2 * i + 1]]) dropped[n.holders[2 * i]] = 1;
-  qmat_free(n.holders);
-  return status;
+  return QMAT_OK;
 }
 
 qmat_status qmat_shape_set_reduce(qmat_context *context, qmat_shape_set *set) {
   builder b = {.context = context,
+               .most = SIZE_MAX,
                .set = {.sphere_count = set->sphere_count, .spheres = set->spheres, .joints = set->joints}};
   for (size_t i = 0; i < set->shape_count; i++) add_reduced(&b, &set->shapes[3 * i]);
   const size_t count = b.set.shape_count;
@@ -401,7 +401,7 @@ static void add_simplex(builder *b, uint32_t x, uint32_t y, uint32_t z, qmat_sha
 qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, const uint32_t *joints,
                                 double least_radius, qmat_shape_kind kind, double dent, size_t most,
                                 qmat_shape_set *set) {
-  builder b = {.context = context, .has_joints = joints};
+  builder b = {.context = context, .most = most, .has_joints = joints};
   uint8_t *used = qmat_arena_calloc(&context->arena, unit->sphere_count, 1);
   b.failed = !used;
   for (size_t i = 0; i < unit->sphere_count && !b.failed; i++) {
@@ -411,12 +411,12 @@ qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, 
     if (joints) b.joint = joints[i];
     add_sphere(&b, sphere);
   }
-  for (size_t i = 0; i < unit->triangle_count && !b.failed; i++) {
+  for (size_t i = 0; i < unit->triangle_count && !b.failed && !b.too_many; i++) {
     const uint32_t *row = &unit->triangles[3 * i];
     for (int k = 0; k < 3; k++) used[row[k]] = 1;
     add_simplex(&b, row[0], row[1], row[2], kind, dent);
   }
-  for (size_t i = 0; i < unit->edge_count && !b.failed; i++) {
+  for (size_t i = 0; i < unit->edge_count && !b.failed && !b.too_many; i++) {
     const uint32_t *row = &unit->edges[2 * i];
     used[row[0]] = used[row[1]] = 1;
     add_simplex(&b, row[0], row[1], row[1], kind, dent);
@@ -424,8 +424,8 @@ qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, 
   for (size_t i = 0; i < unit->sphere_count && !b.failed; i++)
     if (!used[i]) add_shape(&b, (uint32_t)i, (uint32_t)i, (uint32_t)i);
   if (b.failed) return qmat_fail_memory(context, "the colliders");
-  *set = b.set;
-  return b.set.shape_count > most ? QMAT_OK : qmat_shape_set_reduce(context, set);
+  *set = b.too_many ? (qmat_shape_set){.shape_count = SIZE_MAX} : b.set;
+  return b.too_many ? QMAT_OK : qmat_shape_set_reduce(context, set);
 }
 
 qmat_status qmat_shape_set_envelope(qmat_context *context, const qmat_shape_set *set, qmat_envelope **envelope) {

@@ -36,18 +36,33 @@ void qmat_shape_prepare(qmat_prepared_shape *shape, const double *spheres, const
  * (may be NULL) receives the shares of its spheres at the medial point that attains it. */
 double qmat_shape_distance(const qmat_prepared_shape *shape, const double point[3], double weights[3]);
 
+/* As qmat_shape_distance; `medial` receives the medial sphere that attains it, centre and radius. `spheres` and `ids`
+ * are those that the shape was prepared from. */
+double qmat_shape_medial(const qmat_prepared_shape *shape, const double *spheres, const uint32_t ids[3],
+                         const double point[3], double medial[4]);
+
+/* Finds the shape of a joint that is nearest to a point, the first of equally near ones. Returns its signed distance;
+ * INFINITY where the joint has none, which leaves `*nearest` as it is. `shapes` are all of the set, which has joints,
+ * prepared. */
+double qmat_shape_set_nearest_of_joint(const qmat_shape_set *set, const qmat_prepared_shape *shapes, uint32_t joint,
+                                       const double point[3], size_t *nearest);
+
 /* Whether two shapes move with the same joint. */
 bool qmat_shape_set_same_joint(const qmat_shape_set *set, size_t a, size_t b);
 
 /* The volume of a shape; of three spheres it is that of spheres with their mean radius. */
 double qmat_shape_volume(const double *spheres, const uint32_t ids[3]);
 
+/* The most shapes that colliders have where rows of them replace cones and slabs; also the most steps of a row. */
+enum { QMAT_MOST_IN_ROWS = 256 };
+
 /* Makes the shapes of a medial mesh: its maximal simplices. Radii below `least_radius` (above 0) become that. A simplex
  * whose spheres contain each other becomes those that count, and a shape inside another one is left out. With `kind`,
- * slabs and cones become rows of capsules or spheres; the dents between them are at most `dent` deep. Of more than
- * `most` shapes none is left out, which saves time: the caller tries again with deeper dents. `joints` (may be NULL)
- * are those of the spheres; only what is inside a shape of the same joint is left out, here and below.
- * QMAT_ERROR_MEMORY, QMAT_CANCELLED. Cost: quadratic in the shapes. */
+ * slabs and cones become rows of capsules or spheres; the dents between them are at most `dent` deep (above 0). Where
+ * that takes more than QMAT_MOST_IN_ROWS steps along a row, or more than `most` shapes before any is left out, there is
+ * no set: set->shape_count is SIZE_MAX, and the caller tries again with deeper dents. `joints` (may be NULL) are those
+ * of the spheres; only what is inside a shape of the same joint is left out, here and below. QMAT_ERROR_MEMORY,
+ * QMAT_CANCELLED. Cost: quadratic in the shapes where all are near each other. One thread. */
 qmat_status qmat_shape_set_make(qmat_context *context, const qmat_medial *unit, const uint32_t *joints,
                                 double least_radius, qmat_shape_kind kind, double dent, size_t most,
                                 qmat_shape_set *set);

@@ -244,18 +244,12 @@ static int compare_points(const void *left, const void *right) {
 
 static void place_point(const qmat_shape_set *set, const qmat_prepared_shape *shapes, const double *point,
                         uint32_t joint, given_point *given) {
-  double least = INFINITY;
+  size_t nearest = 0;
   memcpy(given->at, point, sizeof given->at);
-  given->shape = UINT32_MAX;
   for (int k = 0; k < 3; k++)
     given->cell[k] = (uint8_t)fmin(fmax((point[k] + 0.5) * QMAT_SOLID_CELLS, 0), QMAT_SOLID_CELLS - 1);
-  for (size_t i = 0; i < set->shape_count; i++) {
-    if (set->joints[set->shapes[3 * i]] != joint) continue;
-    const double distance = qmat_shape_distance(&shapes[i], point, NULL);
-    if (!(distance < least)) continue;
-    least = distance;
-    given->shape = (uint32_t)i;
-  }
+  const double distance = qmat_shape_set_nearest_of_joint(set, shapes, joint, point, &nearest);
+  given->shape = isfinite(distance) ? (uint32_t)nearest : UINT32_MAX;
 }
 
 /* Adds the points of one cell, as a further cell. */

@@ -129,11 +129,9 @@ static double outside_by(const target *t, const double *vertex, double way[3]) {
     }
     return most;
   }
-  double point[3], weights[3], medial[3] = {0};
+  double point[3], medial[4];
   for (int k = 0; k < 3; k++) point[k] = vertex[k] + t->centre[k];
-  const double away = qmat_shape_distance(&t->shape, point, weights);
-  for (int s = 0; s < t->shape.count; s++)
-    for (int k = 0; k < 3; k++) medial[k] += weights[s] * t->spheres[4 * (size_t)t->ids[s] + (size_t)k];
+  const double away = qmat_shape_medial(&t->shape, t->spheres, t->ids, point, medial);
   qmat_subtract(point, medial, way);
   qmat_normalize(way);
   return away;
@@ -180,17 +178,12 @@ static qmat_status finish(qmat_tangent_hull *h, const target *t) {
   return QMAT_OK;
 }
 
-/* Whether to go on. */
-static qmat_status ask(const qmat_tangent_hull *hull) {
-  return hull->context ? qmat_progress(hull->context, 1, 0, "hulls fitted") : QMAT_OK;
-}
-
 /* Adds planes until none is worth it. */
 static qmat_status surround(qmat_tangent_hull *hull, const target *t, double error) {
   const size_t most_planes = hull->most / 2 + 2; /* they meet in 2 planes - 4 vertices at most */
   qmat_status status = meet(hull);
   while (status == QMAT_OK && refine(hull, t, error, most_planes) > 0) {
-    status = ask(hull);
+    status = qmat_hull_go_on(hull->context);
     if (status == QMAT_OK) status = meet(hull);
   }
   return status == QMAT_OK ? finish(hull, t) : status;
@@ -217,7 +210,7 @@ static qmat_status find_facets(const qmat_tangent_hull *hull, target *t, uint32_
     if (!qmat_hull_plane(t->cloud, &triangles[3 * i], facet)) continue;
     facet[3] = reach(t, facet);
     t->facet_count++;
-    status = ask(hull);
+    status = qmat_hull_go_on(hull->context);
   }
   t->facets = facets;
   return status;

@@ -10,6 +10,9 @@
 /* The limit of the entries that the reduction of the matrix visits. */
 static const size_t most_entries = 100000000;
 
+/* Progress is reported each time after so many entries, edges or triangles. */
+enum { ITEMS_A_REPORT = 1 << 16 };
+
 /* The triangles at each edge, in compressed rows, and the number of those not removed. */
 typedef struct sides {
   size_t triangle_count, edge_count;
@@ -52,6 +55,10 @@ static qmat_status remove_free(qmat_context *context, sides *s, size_t *left) {
   while (height > 0) {
     const uint32_t edge = stack[--height];
     if (s->degrees[edge] != 1) continue;
+    if (*left % ITEMS_A_REPORT == 0) {
+      const qmat_status status = qmat_progress(context, s->triangle_count - *left + 1, 0, "triangles at free edges");
+      if (status != QMAT_OK) return status;
+    }
     size_t at = s->offsets[edge];
     while (s->removed[s->triangles_at[at]]) at++;
     const uint32_t triangle = s->triangles_at[at];
@@ -107,7 +114,7 @@ static qmat_status rank_of_branches(qmat_context *context, const sides *s, uint3
   qmat_arena *arena = &context->arena;
   sparse_row *pivots = qmat_arena_calloc(arena, s->triangle_count, sizeof *pivots);
   uint32_t *buffers[2] = {NULL, NULL};
-  size_t capacities[2] = {0, 0}, entries = 0;
+  size_t capacities[2] = {0, 0}, entries = 0, reported = 0;
   qmat_status status = pivots ? QMAT_OK : qmat_fail_memory(context, "the topology");
   *rank = 0;
   for (size_t e = 0; e < s->edge_count && status == QMAT_OK && *known; e++) {
@@ -127,6 +134,11 @@ static qmat_status rank_of_branches(qmat_context *context, const sides *s, uint3
       if (entries > most_entries) {
         *known = false;
         break;
+      }
+      if (entries - reported >= ITEMS_A_REPORT) {
+        reported = entries;
+        status = qmat_progress(context, entries, 0, "entries of voids");
+        if (status != QMAT_OK) break;
       }
       if (pivot->count == 0) {
         pivot->ids = qmat_arena_alloc(arena, count, sizeof *pivot->ids);

@@ -13,15 +13,18 @@
 /* The distance from a shell of the points that test its sides, in diagonals. */
 static const double beside = 1e-5;
 
+/* Loops over triangles and edges report progress each time after so many. */
+enum { ITEMS_A_REPORT = 1 << 16 };
+
 /* Joins the triangles at every edge that has two into shells, and their corners into fans. `is_open`, per triangle: set
  * where an edge has another number. */
 static qmat_status join_at_edges(qmat_context *context, const qmat_mesh *mesh, uint32_t *shells, uint32_t *fans,
                                  uint8_t *is_open) {
   qmat_half_edges e;
-  const qmat_status status =
-      qmat_half_edges_sort(context, mesh->vertex_count, mesh->triangle_count, mesh->triangles, &e);
+  qmat_status status = qmat_half_edges_sort(context, mesh->vertex_count, mesh->triangle_count, mesh->triangles, &e);
   for (size_t i = 0, last; status == QMAT_OK && i < e.count; i = last) {
     last = qmat_edge_last(&e, i);
+    if (i / ITEMS_A_REPORT != last / ITEMS_A_REPORT) status = qmat_progress(context, i, e.count, "edges");
     const uint32_t a = e.order[i], b = e.order[last - 1];
     for (size_t k = i; last - i != 2 && k < last; k++) is_open[e.order[k] / 3] = 1;
     if (last - i != 2) continue;
@@ -143,18 +146,23 @@ qmat_status qmat_topology_of_solid(qmat_context *context, const qmat_surface *su
   shell *sums = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *sums);
   uint8_t *is_open = qmat_arena_calloc(&context->arena, mesh->triangle_count, sizeof *is_open);
   if (!shells || !fans || !sums || !is_open) return qmat_fail_memory(context, "the topology");
-  const qmat_status status = join_at_edges(context, mesh, shells, fans, is_open);
+  qmat_status status = join_at_edges(context, mesh, shells, fans, is_open);
   topology->known = !memchr(is_open, 1, mesh->triangle_count);
   if (!topology->known) topology->why_not = "an edge has more than two triangles: solids touch along it";
   if (status != QMAT_OK || !topology->known) return status;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     double normal[3], centre[3];
+    if (t % ITEMS_A_REPORT == ITEMS_A_REPORT - 1) status = qmat_progress(context, t, mesh->triangle_count, "triangles");
+    if (status != QMAT_OK) return status;
     triangle_vectors(surface, t, normal, centre);
     add_to_shell(&sums[qmat_set_leader(shells, (uint32_t)t)], fans, t, normal, centre);
   }
   for (size_t t = 0; t < mesh->triangle_count; t++) {
     const shell *sum = &sums[t];
-    if (sum->triangle_count == 0 || !separates(surface, sum)) continue;
+    if (sum->triangle_count == 0) continue;
+    status = qmat_progress(context, t + 1, mesh->triangle_count, "triangles of shells");
+    if (status != QMAT_OK) return status;
+    if (!separates(surface, sum)) continue;
     /* Vertices - edges + triangles = 2 - 2 genus, and a triangle has three halves of an edge. */
     topology->loops += (2 + sum->triangle_count / 2 - sum->fan_count) / 2;
     if (sum->volume > 0)

@@ -241,8 +241,8 @@ static void test_both_arms_of_a_biped_have_shapes(void **state) {
 static void test_shapes_of_two_joints_are_not_joined(void **state) {
   (void)state;
   static const char *const params[] = {"fit=contain kind=capsules shapes=1", "fit=contain kind=hulls shapes=1",
-                                       "kind=spheres shapes=1"};
-  for (int i = 0; i < 3; i++) {
+                                       "kind=spheres shapes=1", "fit=inside shapes=1"};
+  for (int i = 0; i < 4; i++) {
     collider_run r = make_colliders(tube(of_biped), cones(), params[i], 2);
     assert_int_equal(r.colliders->shape_count, 3);
     for (uint32_t joint = 0; joint < 3; joint++) assert_int_equal(count_of(r.colliders, joint), 1);

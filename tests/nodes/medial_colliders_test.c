@@ -564,6 +564,61 @@ static void test_budget_kind_and_hull_points_are_kept(void **state) {
   qmat_value_release(&medial->base);
 }
 
+/* Two boxes with a sphere each: the shape for both is outside of both. */
+static void test_a_budget_inside_the_solid_leaves_a_shape(void **state) {
+  (void)state;
+  static const char *const kinds[] = {"any", "capsules", "spheres", "hulls"};
+  static const double spheres[] = {0, 0, 0, 0.4, 5, 0, 0, 0.9};
+  for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+    char params[64];
+    snprintf(params, sizeof params, "fit=inside shapes=1 kind=%s", kinds[i]);
+    qmat_mesh *mesh = shape_box_around(0.5, 0.5, 0.5);
+    shape_add_box(mesh, 4, -1, -1, 6, 1, 1, false);
+    collider_run r = make_colliders(mesh, sealed_medial_mesh(spheres, 2, NULL, 0, NULL, 0), params, 2);
+    assert_int_equal(r.colliders->shape_count, 1);
+    const double *s = &r.colliders->spheres[4 * (size_t)r.colliders->shapes[0]]; /* the larger one */
+    assert_near(s[0], 5, 1e-9);
+    assert_true(s[3] > 0.9 && s[3] < 1 + 1e-6);
+    assert_true(json_is_true(json_object_get(r.report->root, "proved")));
+    collider_run_free(&r);
+  }
+}
+
+/* The deepest dent between neighbours of equal spheres along x, which may come in any order. */
+static double deepest_dent(const qmat_colliders *c) {
+  double most = 0;
+  for (size_t i = 0; i < c->shape_count; i++) {
+    const double *s = &c->spheres[4 * (size_t)c->shapes[3 * i]];
+    double next = INFINITY;
+    for (size_t j = 0; j < c->shape_count; j++) {
+      const double *t = &c->spheres[4 * (size_t)c->shapes[3 * j]];
+      if (t[0] > s[0]) next = fmin(next, t[0] - s[0]);
+    }
+    if (isfinite(next)) most = fmax(most, s[3] - sqrt(fmax(s[3] * s[3] - next * next / 4, 0)));
+  }
+  return most;
+}
+
+static void test_dents_are_as_deep_as_the_report_says(void **state) {
+  (void)state;
+  static const struct { double half, asked; } cases[] = {{0.005, 1e-4}, {0.005, 1e-3}, {0.02, 1e-4}, {0.002, 1e-4}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    const double r = cases[i].half, spheres[] = {-0.5, 0, 0, r, 0.5, 0, 0, r};
+    char params[64];
+    snprintf(params, sizeof params, "kind=spheres dent=%g", cases[i].asked);
+    collider_run run = make_colliders(shape_box_around(0.5 + r, r, r),
+                                      sealed_medial_mesh(spheres, 2, (const uint32_t[]){0, 1}, 1, NULL, 0), params, 2);
+    const double told = pipeline_number(run.report, "dent"), diagonal = pipeline_number(run.report, "diagonal");
+    assert_in_range(run.colliders->shape_count, 3, 256);
+    assert_true(told >= cases[i].asked);
+    assert_true(deepest_dent(run.colliders) <= told * diagonal * (1 + 1e-9));
+    /* Deeper dents than asked only where those asked take more than 256 spheres. */
+    const double step = 2 * sqrt(cases[i].asked * diagonal * (2 * r - cases[i].asked * diagonal));
+    assert_true((told > cases[i].asked) == (1 / step > 255));
+    collider_run_free(&run);
+  }
+}
+
 static void test_one_two_and_eight_threads_make_the_same_bytes(void **state) {
   (void)state;
   qmat_mesh *mesh;
@@ -606,6 +661,8 @@ int main(void) {
       cmocka_unit_test(test_a_sheet_without_area_has_a_hull),
       cmocka_unit_test(test_hulls_of_the_solid_contain_it),
       cmocka_unit_test(test_budget_kind_and_hull_points_are_kept),
+      cmocka_unit_test(test_a_budget_inside_the_solid_leaves_a_shape),
+      cmocka_unit_test(test_dents_are_as_deep_as_the_report_says),
       cmocka_unit_test(test_one_two_and_eight_threads_make_the_same_bytes),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "tests/random.h"
+#include "tests/shortage.h"
 
 /* Single spheres in the unit box. Some are equal to others, or within them. */
 static qmat_shape_set random_spheres(qmat_context *context, size_t count, double radius) {
@@ -78,10 +79,33 @@ static void test_shapes_far_apart_are_not_compared(void **state) {
   if (many > 24 * few + 0.1) fail_msg("%.3f s, after %.3f s", many, few);
 }
 
+/* How often memory is asked for to reduce concentric spheres, the smallest first, or equal ones that are apart. */
+static size_t allocations_for(size_t count, bool are_nested) {
+  qmat_context context = {.threads = 1};
+  qmat_shape_set set = random_spheres(&context, count, 0.1);
+  for (size_t i = 0; i < count; i++) {
+    const double at = (double)i / (double)count;
+    const double sphere[] = {are_nested ? 0 : at - 0.5, 0, 0, are_nested ? 0.1 + 0.1 * at : 0.1 / (double)count};
+    memcpy(&set.spheres[4 * i], sphere, sizeof sphere);
+  }
+  shortage(SIZE_MAX, 0);
+  assert_int_equal(qmat_shape_set_reduce(&context, &set), QMAT_OK);
+  const size_t allocations = atomic_load(&asked);
+  assert_int_equal(set.shape_count, are_nested ? 1 : count);
+  qmat_context_uninit(&context);
+  return allocations;
+}
+
+static void test_nested_shapes_take_no_more_memory_than_others(void **state) {
+  (void)state;
+  assert_int_equal(allocations_for(2000, true), allocations_for(2000, false));
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_what_stays_is_in_no_other_shape),
       cmocka_unit_test(test_shapes_far_apart_are_not_compared),
+      cmocka_unit_test(test_nested_shapes_take_no_more_memory_than_others),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -348,6 +348,82 @@ static void test_flat_shells_beside_open_sheets_enclose_no_void(void **state) {
   }
 }
 
+/* ---- cancels ---- */
+
+/* Cancels at the first report in one unit. */
+typedef struct canceller {
+  qmat_context context;
+  const char *unit;
+  size_t reports;
+} canceller;
+
+static bool cancel_at_unit(void *user, const char *id, const char *type, uint64_t done, uint64_t total,
+                           const char *unit) {
+  canceller *c = user;
+  (void)id, (void)type, (void)done, (void)total;
+  c->context.progress_time = 0; /* each report comes here */
+  c->reports += strcmp(unit, c->unit) == 0;
+  return c->reports == 0;
+}
+
+static void must_stop(const qmat_medial *medial, const qmat_surface *surface, const char *unit) {
+  canceller c = {.unit = unit};
+  c.context.progress = cancel_at_unit;
+  c.context.progress_user = &c;
+  qmat_topology t;
+  assert_int_equal(
+      medial ? qmat_topology_of_medial(&c.context, medial, &t) : qmat_topology_of_solid(&c.context, surface, &t),
+      QMAT_CANCELLED);
+  assert_int_equal(c.reports, 1);
+  qmat_context_uninit(&c.context);
+}
+
+static void test_long_loops_over_a_solid_obey_a_cancel(void **state) {
+  (void)state;
+  enum { BOXES = 6000 }; /* 72,000 triangles */
+  qmat_context context = {0};
+  qmat_mesh *mesh = shape_new();
+  for (int i = 0; i < BOXES; i++)
+    shape_add_box(mesh, 2 * (i % 20), 2 * (i / 20 % 20), 2 * (i / 400), 2 * (i % 20) + 1, 2 * (i / 20 % 20) + 1,
+                  2 * (i / 400) + 1, false);
+  mesh = shape_seal(mesh);
+  qmat_surface *surface;
+  assert_int_equal(qmat_surface_new(&context, mesh, &surface), QMAT_OK);
+  must_stop(NULL, surface, "edges");
+  must_stop(NULL, surface, "triangles");
+  must_stop(NULL, surface, "triangles of shells");
+  qmat_surface_free(surface);
+  qmat_value_release(&mesh->base);
+  qmat_context_uninit(&context);
+}
+
+static void test_long_loops_over_a_medial_mesh_obey_a_cancel(void **state) {
+  (void)state;
+  enum { STRIP = 1 << 16, CELLS = 12, ROW = CELLS + 1, POINTS = ROW * ROW * ROW };
+  uint32_t *rows = test_malloc(3 * STRIP * sizeof *rows);
+  for (uint32_t t = 0; t < STRIP; t++)
+    for (uint32_t k = 0; k < 3; k++) rows[3 * t + k] = t + k;
+  qmat_medial *medial = sealed_medial_mesh(NULL, STRIP + 2, NULL, 0, rows, STRIP);
+  must_stop(medial, NULL, "triangles at free edges");
+  qmat_value_release(&medial->base);
+  /* The sides of the cells of a grid. */
+  static const uint32_t steps[] = {1, ROW, ROW * ROW};
+  size_t count = 0;
+  for (uint32_t p = 0; p < POINTS; p++)
+    for (int k = 0; k < 3; k++) {
+      const uint32_t u = steps[k], v = steps[(k + 1) % 3];
+      if (p / u % ROW == CELLS || p / v % ROW == CELLS) continue;
+      const uint32_t square[] = {p, p + u, p + u + v, p, p + v, p + u + v};
+      memcpy(&rows[3 * count], square, sizeof square);
+      count += 2;
+    }
+  medial = sealed_medial_mesh(NULL, POINTS, NULL, 0, rows, count);
+  assert_int_equal(topology_of(medial).voids, CELLS * CELLS * CELLS);
+  must_stop(medial, NULL, "entries of voids");
+  qmat_value_release(&medial->base);
+  test_free(rows);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_small_complexes_by_hand),
@@ -364,6 +440,8 @@ int main(void) {
       cmocka_unit_test(test_nothing_is_said_of_open_and_branching_surfaces),
       cmocka_unit_test(test_flat_shells_of_sheets_enclose_no_void),
       cmocka_unit_test(test_flat_shells_beside_open_sheets_enclose_no_void),
+      cmocka_unit_test(test_long_loops_over_a_solid_obey_a_cancel),
+      cmocka_unit_test(test_long_loops_over_a_medial_mesh_obey_a_cancel),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
