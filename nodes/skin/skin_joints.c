@@ -2,7 +2,6 @@
 #include "nodes/skin/skin_joints.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/geometry/half_edges.h"
@@ -16,6 +15,8 @@ static const double SPACING = 0.01;
 enum { LEAST_PARTS = 4, MOST_PARTS = 64, MOST_CORNERS = 3 * MOST_PARTS };
 /* The first pass divides along the edges that are there; the next ones divide those between the new vertices. */
 enum { MOST_PASSES = 4 };
+/* What is allowed grows by this factor while there are too many triangles. */
+static const double COARSER = 1.5;
 /* So many vertices or edges are judged between two questions whether to go on. */
 enum { SLICE = 2048 };
 
@@ -25,7 +26,6 @@ typedef struct edge {
   uint32_t first;   /* of the new vertices, which go from the first end to the second */
   uint64_t chosen;  /* bit i: a vertex comes after part i */
   double length;
-  double error; /* the largest; 0 where the edge stays whole */
 } edge;
 
 typedef struct influences {
@@ -90,7 +90,6 @@ static void choose(const influences *found, double allowed, uint32_t low, uint32
   }
   if (worst == 0) return;
   e->chosen |= (uint64_t)1 << (worst - 1);
-  e->error = fmax(e->error, most);
   choose(found, allowed, low, worst, e);
   choose(found, allowed, worst, high, e);
 }
@@ -172,30 +171,8 @@ static qmat_status judge_edges(division *d, size_t first) {
   return status;
 }
 
-static int by_falling_error(const void *left, const void *right) {
-  const edge *const *a = left, *const *b = right;
-  if ((*a)->error != (*b)->error) return (*a)->error > (*b)->error ? -1 : 1;
-  return *a < *b ? -1 : *a > *b;
-}
-
 static size_t count_chosen(const edge *e) {
   return (size_t)__builtin_popcountll(e->chosen);
-}
-
-/* Leaves only the edges with the largest errors, of at most `room` triangles more. `uses`: triangles per edge. */
-static qmat_status leave_worst(division *d, const uint32_t *uses, size_t room) {
-  edge **list = qmat_arena_alloc(&d->context->arena, d->edge_count, sizeof *list);
-  if (!list) return qmat_fail_memory(d->context, "the edges of the skin");
-  size_t count = 0;
-  for (size_t i = 0; i < d->edge_count; i++)
-    if (d->edges[i].chosen) list[count++] = &d->edges[i];
-  if (count > 0) qsort(list, count, sizeof(edge *), by_falling_error);
-  for (size_t i = 0; i < count; i++) {
-    const size_t needed = count_chosen(list[i]) * uses[list[i] - d->edges];
-    if (needed > room) list[i]->chosen = 0;
-    if (needed <= room) room -= needed;
-  }
-  return QMAT_OK;
 }
 
 /* A triangle with more vertices on its sides. */
@@ -291,7 +268,7 @@ static qmat_status divide(division *d, size_t vertices, size_t triangles) {
 }
 
 /* One pass over the surface, whose vertices from `first` on are new. `*is_divided`: there are more now. */
-static qmat_status run_pass(division *d, size_t first, size_t most, bool *is_divided) {
+static qmat_status run_pass(division *d, size_t first, bool *is_divided) {
   const size_t count = d->surface->triangle_count;
   *is_divided = false;
   qmat_status status = find_known(d, first);
@@ -301,8 +278,6 @@ static qmat_status run_pass(division *d, size_t first, size_t most, bool *is_div
   uint32_t *uses = qmat_arena_calloc(&d->context->arena, d->edge_count, sizeof *uses);
   if (!uses) return qmat_fail_memory(d->context, "the edges of the skin");
   for (size_t h = 0; h < 3 * count; h++) uses[d->edge_of[h]]++;
-  if (most > 0) status = leave_worst(d, uses, most > count ? most - count : 0);
-  if (status != QMAT_OK) return status;
   size_t vertices = 0, triangles = 0;
   for (size_t i = 0; i < d->edge_count; i++) {
     vertices += count_chosen(&d->edges[i]);
@@ -312,17 +287,49 @@ static qmat_status run_pass(division *d, size_t first, size_t most, bool *is_div
   return *is_divided ? divide(d, vertices, triangles) : QMAT_OK;
 }
 
-qmat_status qmat_skin_divide_at_joints(qmat_context *context, const qmat_mesh *mesh, const qmat_frame *frame,
-                                       double allowed, size_t most, qmat_skin_triangles *surface) {
-  division d = {.context = context, .frame = frame, .allowed = allowed, .surface = surface};
-  if (mesh->skinned_count == 0 || surface->triangle_count == 0) return QMAT_OK;
-  qmat_status status = qmat_surface_new(context, mesh, &d.skinned);
+static qmat_status run_passes(division *d) {
+  qmat_status status = QMAT_OK;
   bool is_divided = true;
   size_t first = 0;
   for (int pass = 0; pass < MOST_PASSES && is_divided && status == QMAT_OK; pass++) {
-    const size_t before = surface->vertex_count;
-    status = run_pass(&d, first, most, &is_divided);
+    const size_t before = d->surface->vertex_count;
+    status = run_pass(d, first, &is_divided);
     first = before;
+  }
+  return status;
+}
+
+qmat_status qmat_skin_divide_at_joints(qmat_context *context, const qmat_mesh *mesh, const qmat_frame *frame,
+                                       double allowed, size_t most, qmat_skin_triangles *surface) {
+  if (mesh->skinned_count == 0 || surface->triangle_count == 0) return QMAT_OK;
+  division d = {.context = context, .frame = frame, .allowed = allowed, .surface = surface};
+  const qmat_skin_triangles given = *surface;
+  bool fits = false;
+  qmat_status status = qmat_surface_new(context, mesh, &d.skinned);
+  while (status == QMAT_OK && !fits) {
+    surface->positions = qmat_alloc(3 * given.vertex_count, sizeof *surface->positions);
+    surface->triangles = qmat_alloc(3 * given.triangle_count, sizeof *surface->triangles);
+    surface->vertex_count = given.vertex_count;
+    surface->triangle_count = given.triangle_count;
+    if (!surface->positions || !surface->triangles) {
+      status = qmat_fail_memory(context, "the skin");
+    } else {
+      memcpy(surface->positions, given.positions, 3 * given.vertex_count * sizeof *given.positions);
+      memcpy(surface->triangles, given.triangles, 3 * given.triangle_count * sizeof *given.triangles);
+      status = run_passes(&d);
+    }
+    fits = status == QMAT_OK &&
+           (most == 0 || surface->triangle_count <= most || surface->vertex_count == given.vertex_count);
+    if (!fits) {
+      qmat_free(surface->positions);
+      qmat_free(surface->triangles);
+      *surface = given;
+    }
+    d.allowed *= COARSER;
+  }
+  if (fits) {
+    qmat_free(given.positions);
+    qmat_free(given.triangles);
   }
   qmat_free(d.known);
   qmat_surface_free(d.skinned);
