@@ -5,6 +5,7 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/frame.h"
+#include "core/geometry/joint_weights.h"
 #include "core/json_text.h"
 #include "core/node.h"
 #include "core/text.h"
@@ -13,6 +14,7 @@
 #include "nodes/skin/flat_primitives.h"
 #include "nodes/skin/skin_decimate.h"
 #include "nodes/skin/skin_distance.h"
+#include "nodes/skin/skin_joints.h"
 #include "nodes/skin/skin_surface_cgal.h"
 #include "nodes/skin/skin_topology.h"
 
@@ -42,7 +44,8 @@ typedef struct skin {
   qmat_context *context;
   const medial_skin_params *params;
   const qmat_medial *medial;
-  qmat_medial solid, flat; /* its slabs and cones with a positive radius, and the others; spheres in model units */
+  const qmat_mesh *skinned; /* the surface with joints; NULL: none */
+  qmat_medial solid, flat;  /* its slabs and cones with a positive radius, and the others; spheres in model units */
   qmat_frame frame;
   double *spheres;         /* in the unit frame */
   qmat_envelope *envelope; /* of `solid` */
@@ -50,6 +53,7 @@ typedef struct skin {
   qmat_envelope_grid grid;
   int detail;                    /* of the grid: less than asked for where that would be too many cells */
   size_t contour_triangle_count; /* before decimation */
+  size_t joint_vertex_count;     /* added where joints change */
   qmat_skin_errors errors;
   double to_envelope, from_envelope; /* upper bounds of the distances between the mesh and the envelope */
   qmat_cell_mark *marks;             /* where cells are halved; freed at the end */
@@ -241,6 +245,9 @@ enum { MOST_CONTOUR_CELLS = 300000 };
 /* The share of the error that the contour may have. Crevices narrower than a cell fill, so that some need finer cells.
  */
 static const double CONTOUR_SHARE = 0.3;
+/* The multiple of the error that bending may add between the vertices of a skinned model: it is hardly seen, and less
+ * takes many more vertices. */
+static const double BEND_SHARE = 5;
 /* So many contours are decimated, each with finer cells where the one before exceeds the error. */
 enum { MOST_CONTOURS = 4 };
 /* Beyond this multiple of the error the contour itself is too far, in crevices narrower than the finest cells. Only the
@@ -400,11 +407,12 @@ static qmat_status refine_contour(skin *s, int detail) {
  * places beyond the error; free it with qmat_skin_distance_uninit, also after a failure. */
 static qmat_status decimate_copy(skin *s, const qmat_skin_triangles *contour, qmat_skin_distance *far) {
   const medial_skin_params *p = s->params;
+  const size_t most = (size_t)p->triangles, spared = s->skinned ? most / 3 : 0; /* for bending */
   *far = (qmat_skin_distance){0};
   drop_triangles(&s->surface);
   qmat_status status = copy_triangles(s, contour, &s->surface);
   if (status == QMAT_OK)
-    status = qmat_skin_decimate(s->context, s->envelope, p->error, (size_t)p->triangles, &s->surface, &s->errors);
+    status = qmat_skin_decimate(s->context, s->envelope, p->error, most - spared, &s->surface, &s->errors);
   return status == QMAT_OK ? bound_distance(s, p->error, far) : status;
 }
 
@@ -525,6 +533,9 @@ static qmat_status fill_report(skin *s, qmat_report *report) {
       status = qmat_fail_memory(s->context, "the report");
     json_decref(decimated);
   }
+  if (details && s->skinned && is_decimated(s->params) &&
+      json_object_set_new(details, "joint_vertices", json_integer((json_int_t)s->joint_vertex_count)) != 0)
+    status = qmat_fail_memory(s->context, "the report");
   if (!root || !details || json_object_update(report->root, root) || json_object_update(report->root, details))
     status = qmat_fail_memory(s->context, "the report");
   json_decref(root);
@@ -550,20 +561,34 @@ static qmat_status make_closed_surface(skin *s) {
   return make_envelope_surface(s);
 }
 
+/* Decimation leaves long edges on straight limbs, which could not bend. */
+static qmat_status divide_at_joints(skin *s) {
+  if (!s->skinned || !is_decimated(s->params)) return QMAT_OK;
+  const size_t before = s->surface.vertex_count;
+  const qmat_status status = qmat_skin_divide_at_joints(
+      s->context, s->skinned, &s->frame, BEND_SHARE * s->params->error, (size_t)s->params->triangles, &s->surface);
+  s->joint_vertex_count += s->surface.vertex_count - before;
+  return status;
+}
+
 static qmat_status run(qmat_context *context, const void *raw_params, const qmat_value *const inputs[],
                        qmat_value *outputs[]) {
   const medial_skin_params *params = raw_params;
+  const qmat_mesh *model = (const qmat_mesh *)inputs[1];
   skin s = {.context = context, .params = params, .medial = (const qmat_medial *)inputs[0]};
+  if (model && model->skinned_count > 0 && model->triangle_count > 0) s.skinned = model;
   qmat_mesh *mesh = qmat_mesh_new();
   qmat_report *report = qmat_report_new();
   qmat_status status = mesh && report ? QMAT_OK : qmat_fail_memory(context, "the skin");
   if (status == QMAT_OK) status = qmat_flat_primitives_separate(context, s.medial, &s.solid, &s.flat);
   if (status == QMAT_OK) status = find_frame(&s);
   if (status == QMAT_OK && has_volume(&s)) status = make_closed_surface(&s);
+  if (status == QMAT_OK) status = divide_at_joints(&s);
   if (status == QMAT_OK) status = fill_report(&s, report);
   if (status == QMAT_OK)
     status = qmat_flat_primitives_append(context, &s.flat, s.spheres,
                                          ldexp(1 / (double)params->resolution, -(int)params->detail), &s.surface);
+  if (status == QMAT_OK && s.flat.triangle_count > 0) status = divide_at_joints(&s);
   if (status == QMAT_OK) {
     qmat_frame_to_model(&s.frame, s.surface.positions, s.surface.vertex_count, s.surface.positions);
     mesh->vertex_count = s.surface.vertex_count;
@@ -574,6 +599,7 @@ static qmat_status run(qmat_context *context, const void *raw_params, const qmat
     mesh->oriented = true;
     mesh->deviation = s.frame.diagonal * distance_of(&s);
     s.surface = (qmat_skin_triangles){0};
+    if (s.skinned) status = qmat_joints_of_surface(context, s.skinned, mesh);
   }
   drop_triangles(&s.surface);
   qmat_free(s.marks);
@@ -618,6 +644,10 @@ static const qmat_param params[] = {
 
 static const qmat_port inputs[] = {
     {.name = "medial", .type = QMAT_MEDIAL, .doc = "A medial mesh"},
+    {.name = "mesh",
+     .type = QMAT_MESH,
+     .doc = "The surface that it describes: where that has joints, the mesh gets them",
+     .optional = true},
     {0},
 };
 
@@ -627,7 +657,8 @@ static const qmat_port outputs[] = {
     {0},
 };
 
-static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_library_meshoptimizer, NULL};
+static const qmat_library *const libraries[] = {&qmat_library_cgal, &qmat_library_embree, &qmat_library_meshoptimizer,
+                                                NULL};
 
 const qmat_node qmat_node_medial_skin = {
     .name = "medial.skin",
@@ -645,6 +676,9 @@ const qmat_node qmat_node_medial_skin = {
         "Slabs of radius zero, the sheets, are added as two triangles each, one a side, and loose cones of radius zero "
         "as prisms of three sides; those of length zero are left out. The counts and distances of the report are "
         "without them.\n\n"
+        "Of a skinned model, whose surface is the input mesh, each vertex gets the joints and weights of the nearest "
+        "point of it. Where weights change along an edge, a decimated mesh is divided without moving it, so that it "
+        "bends; the report counts the vertices (joint_vertices). Of a number of triangles, a third is for that.\n\n"
         "The method skin_surface is the paper's: CGAL's skin surface, which takes balls only. Cones and slabs are "
         "filled with balls first. It takes 3 to 15 milliseconds a ball. Its distances are bounded, too.\n\n"
         "The report has the largest distance from the envelope at vertices and at triangle centroids. For a decimated "

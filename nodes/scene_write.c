@@ -159,6 +159,11 @@ static qmat_status add_vertex_data(qmat_context *context, const scene_write_para
     const qmat_status status = qmat_skin_colours(context, medial, skin, &addition->vertices.colours);
     if (status != QMAT_OK) return status;
   }
+  if (has_joints && skin->skinned_count > 0) {
+    addition->vertices.joints = skin->joints;
+    addition->vertices.weights = skin->weights;
+    return QMAT_OK;
+  }
   if (!has_joints || medial->skinned_count == 0) return QMAT_OK;
   uint32_t *joints = qmat_arena_alloc(&context->arena, 4 * skin->vertex_count, sizeof *joints);
   double *weights = qmat_arena_alloc(&context->arena, 4 * skin->vertex_count, sizeof *weights);

@@ -6,6 +6,7 @@
 
 #include "core/geometry/envelope.h"
 #include "core/geometry/frame.h"
+#include "core/geometry/surface.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector.h"
 #include "core/value.h"
@@ -266,5 +267,66 @@ qmat_status qmat_joints_of_envelope(qmat_context *context, const qmat_medial *me
     status = qmat_progress(context, end, mesh->vertex_count, "vertices");
   }
   qmat_envelope_free(envelope);
+  return status;
+}
+
+/* ---- the surface ---- */
+
+/* The weights of a triangle's corners at a point on it. */
+static void weights_on_triangle(const double *const corners[3], const double point[3], double weights[3]) {
+  double normal[3], sum = 0, least = INFINITY;
+  int nearest = 0;
+  qmat_triangle_normal(corners[0], corners[1], corners[2], normal);
+  for (int k = 0; k < 3; k++) {
+    double side[3], from[3], product[3];
+    qmat_subtract(corners[(k + 2) % 3], corners[(k + 1) % 3], side);
+    qmat_subtract(point, corners[(k + 1) % 3], from);
+    qmat_cross(side, from, product);
+    weights[k] = fmax(qmat_dot(product, normal), 0);
+    sum += weights[k];
+    const double distance = qmat_point_distance(corners[k], point);
+    if (!(distance < least)) continue;
+    least = distance;
+    nearest = k;
+  }
+  for (int k = 0; k < 3; k++) weights[k] = sum > 0 ? weights[k] / sum : k == nearest;
+}
+
+void qmat_joints_at(const qmat_surface *surface, const double point[3], uint32_t joints[4], double weights[4]) {
+  const qmat_mesh *mesh = qmat_surface_mesh(surface);
+  const double *positions = qmat_surface_positions(surface), *corners[3];
+  double place[3], closest[3], shares[3], given[12];
+  uint32_t triangle = 0, named[12];
+  qmat_frame_to_unit(qmat_surface_frame(surface), point, 1, place);
+  memcpy(closest, place, sizeof closest);
+  (void)qmat_surface_distance(surface, place, INFINITY, closest, &triangle);
+  const uint32_t *ids = mesh->triangles + 3 * (size_t)triangle;
+  for (size_t k = 0; k < 3; k++) corners[k] = positions + 3 * (size_t)ids[k];
+  weights_on_triangle(corners, closest, shares);
+  for (size_t i = 0; i < 12; i++) {
+    named[i] = mesh->joints[4 * (size_t)ids[i / 4] + i % 4];
+    given[i] = shares[i / 4] * mesh->weights[4 * (size_t)ids[i / 4] + i % 4];
+  }
+  qmat_strongest_joints(named, given, 12, joints, weights);
+}
+
+qmat_status qmat_joints_of_surface(qmat_context *context, const qmat_mesh *given, qmat_mesh *mesh) {
+  enum { SLICE = 16384 }; /* vertices between two calls of the progress function */
+  qmat_surface *surface;
+  if (given->skinned_count == 0 || given->triangle_count == 0) return QMAT_OK;
+  mesh->joints = qmat_alloc(4 * mesh->vertex_count, sizeof *mesh->joints);
+  mesh->weights = qmat_alloc(4 * mesh->vertex_count, sizeof *mesh->weights);
+  if (!mesh->joints || !mesh->weights) return qmat_fail_memory(context, "the joints of vertices");
+  mesh->skinned_count = mesh->vertex_count;
+  qmat_status status = qmat_surface_new(context, given, &surface);
+  const int threads = qmat_threads(context);
+  for (size_t first = 0; first < mesh->vertex_count && status == QMAT_OK; first += SLICE) {
+    const size_t end = first + SLICE < mesh->vertex_count ? first + SLICE : mesh->vertex_count;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 256)
+    for (size_t v = first; v < end; v++)
+      qmat_joints_at(surface, mesh->positions + 3 * v, mesh->joints + 4 * v, mesh->weights + 4 * v);
+    status = qmat_progress(context, end, mesh->vertex_count, "vertices");
+  }
+  qmat_surface_free(surface);
   return status;
 }

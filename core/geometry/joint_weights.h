@@ -13,6 +13,7 @@ extern "C" {
 
 struct qmat_mesh;
 struct qmat_medial;
+struct qmat_surface;
 
 /* Joints and weights of skinned meshes and of the spheres that describe them. */
 
@@ -36,6 +37,16 @@ qmat_status qmat_joints_of_spheres(qmat_context *context, const struct qmat_mesh
  * result does not depend on them. Cost: a query of the envelope for each vertex. */
 qmat_status qmat_joints_of_envelope(qmat_context *context, const struct qmat_medial *medial,
                                     const struct qmat_mesh *mesh, uint32_t *joints, double *weights);
+
+/* Gives a point (3 doubles, in the units of the mesh) the joints and weights of the nearest point of a surface, whose
+ * mesh has joints: those of the corners of its triangle, blended. `joints` and `weights` get 4, as above. Any number of
+ * threads may call it at once. Cost: a query of the surface. */
+void qmat_joints_at(const struct qmat_surface *surface, const double point[3], uint32_t joints[4], double weights[4]);
+
+/* Gives each vertex of an unsealed mesh, in the units of `given`, those at its place. The mesh owns its new arrays,
+ * also on failure. Nothing is done where `given`, which is sealed, has no skin. QMAT_ERROR_MEMORY, QMAT_ERROR_GEOMETRY
+ * for a `given` without a diagonal, QMAT_CANCELLED. Threads are the context's; the result does not depend on them. */
+qmat_status qmat_joints_of_surface(qmat_context *context, const struct qmat_mesh *given, struct qmat_mesh *mesh);
 
 #ifdef __cplusplus
 }

@@ -31,11 +31,15 @@ void qmat_usd_put_body_schemas(qmat_writer *writer, size_t depth) {
 }
 
 void qmat_usd_put_body(qmat_writer *writer, size_t depth, const double body[10], const double origin[3],
-                       double kilograms) {
+                       double kilograms, bool is_kinematic) {
   double moments[3], rotation[4], centre[3];
   qmat_principal_inertia(body, moments, rotation);
   for (int k = 0; k < 3; k++) moments[k] /= kilograms;
   qmat_subtract(&body[1], origin, centre);
+  if (is_kinematic) {
+    qmat_put_indent(writer, depth);
+    qmat_put_text(writer, "bool physics:kinematicEnabled = true\n");
+  }
   qmat_put_indent(writer, depth);
   put_attribute(writer, "float physics:mass = ", body[0] / kilograms);
   qmat_put_indent(writer, depth);

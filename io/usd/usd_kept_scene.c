@@ -98,6 +98,48 @@ static const qmat_usd_spec *find_variant(const qmat_usd_prim *prim) {
   return NULL;
 }
 
+/* Whether samples of a transform operation differ. Exporters write a sample per frame of what stays, too. */
+static bool has_changing_samples(const qmat_usd_samples *samples) {
+  const qmat_usd_value *first = NULL;
+  for (size_t i = 0; i < samples->count; i++) {
+    const qmat_usd_value *value = samples->values[i];
+    if (value->is_array || !qmat_usd_is_number(value->type)) continue;
+    if (!first) first = value;
+    if (value->components != first->components) return true;
+    for (size_t k = 0; k < value->components; k++)
+      if (value->numbers[k] != first->numbers[k]) return true;
+  }
+  return false;
+}
+
+/* Whether an operation of the prim's own transform changes over time. `*resets`: what is above does not matter. */
+static qmat_status find_motion(const qmat_usd_prim *prim, bool *moves, bool *resets) {
+  static const char invert[] = "!invert!";
+  const qmat_usd_value *order;
+  const qmat_status status = qmat_usd_prim_attribute(prim, "xformOpOrder", &order);
+  if (status != QMAT_OK || !order || !order->is_array || !qmat_usd_is_text(order->type)) return status;
+  for (size_t i = order->count; i-- > 0 && !*resets;) { /* operations before a reset do not matter either */
+    const char *name = order->texts[i];
+    const qmat_usd_samples *samples;
+    const qmat_usd_value *fixed;
+    qmat_usd_time time;
+    *resets = strcmp(name, "!resetXformStack!") == 0;
+    if (strncmp(name, invert, sizeof invert - 1) == 0) name += sizeof invert - 1;
+    qmat_usd_prim_samples(prim, name, &samples, &time, &fixed);
+    *moves = *moves || (samples && has_changing_samples(samples));
+  }
+  return QMAT_OK;
+}
+
+/* Whether the transform of the prim, or of one above it, changes over time. */
+static qmat_status find_animated(const qmat_usd_prim *prim, bool *is_animated) {
+  qmat_status status = QMAT_OK;
+  bool resets = false;
+  for (; prim && !resets && !*is_animated && status == QMAT_OK; prim = prim->parent)
+    status = find_motion(prim, is_animated, &resets);
+  return status;
+}
+
 qmat_status qmat_usd_kept_scene_find(qmat_usd_kept_scene *kept, const char *path, qmat_usd_kept_prim *kept_prim) {
   bool found;
   *kept_prim = (qmat_usd_kept_prim){0};
@@ -107,6 +149,8 @@ qmat_status qmat_usd_kept_scene_find(qmat_usd_kept_scene *kept, const char *path
   status = qmat_progress(prim->log->context, 1, 0, "prims");
   if (status != QMAT_OK) return status;
   kept_prim->variant = find_variant(prim);
+  status = find_animated(prim, &kept_prim->is_animated);
+  if (status != QMAT_OK) return status;
   return list_medials(kept, prim, kept_prim);
 }
 

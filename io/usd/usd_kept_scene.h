@@ -20,6 +20,7 @@ typedef struct qmat_usd_kept_prim {
   size_t medial_count;
   const char *const *medials;   /* medial_count: names of children that are active medial meshes of earlier runs */
   const qmat_usd_spec *variant; /* that the prim's shape comes from; NULL: from none */
+  bool is_animated;             /* the transform of the prim, or of one above it, changes over time */
 } qmat_usd_kept_prim;
 
 /* Opens the scene in `part`, which must outlive it: a package, or a layer that needs no other file. Files beside it are

@@ -356,7 +356,7 @@ static void put_prim(qmat_writer *writer, const stored *s, const qmat_usd_option
   if (has_origin(s)) put_translation(writer, s->origin);
   if (is_body && options->colliders->body_count > 0) {
     qmat_put_text(writer, "\n");
-    qmat_usd_put_body(writer, 1, options->colliders->body, s->origin, 1);
+    qmat_usd_put_body(writer, 1, options->colliders->body, s->origin, 1, false);
   }
   if (s->skin.triangle_count > 0) put_skin(writer, &s->skin);
   put_spheres(writer, medial);

@@ -65,6 +65,7 @@ typedef struct qmat_usd_addition {
  *
  * With colliders, the prims become rigid bodies, each with the mass and the inertia of its place, in the units of mass
  * and length of the scene; not where a prim, or one above it, is a body already or is a collider (placement_bodies).
+ * Bodies whose transform, or that of a prim above them, changes over time are kinematic.
  *
  * A layer that is no package has one side part, the scene's file: "original.usda", ".usdc" or ".usdz". A package
  * contains everything: the layer first, and the scene's files in the folder "original". options->form and name are

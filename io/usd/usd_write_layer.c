@@ -83,7 +83,7 @@ static void open_prims(qmat_writer *writer, const char *path, size_t open, bool 
 
 /* The attributes of a body at a place, in the scene's units. */
 static void put_body(qmat_writer *writer, size_t depth, const qmat_scene *scene, size_t place,
-                     const qmat_usd_options *options, double kilograms) {
+                     const qmat_usd_options *options, double kilograms, bool is_kinematic) {
   static const double origin[3] = {0, 0, 0};
   const double *m = scene->placements + 16 * place;
   double linear[3][3], rotation[3][3], body[10];
@@ -93,7 +93,7 @@ static void put_body(qmat_writer *writer, size_t depth, const qmat_scene *scene,
   const double unit = scene->meters_per_unit > 0 ? scene->meters_per_unit : 1;
   qmat_rotation_in(linear, rotation);
   qmat_placed_body(options->colliders->body, linear, rotation, options->errors.meters_per_unit / unit, body);
-  qmat_usd_put_body(writer, depth, body, origin, kilograms);
+  qmat_usd_put_body(writer, depth, body, origin, kilograms, is_kinematic);
 }
 
 /* Whether text can name a prim that a crate calls so. The name ends at a slash. */
@@ -226,7 +226,7 @@ static void put_overs(const qmat_scene *scene, const qmat_usd_addition *addition
     open = count_names(at->path);
     if (is_body) {
       body = open - 1;
-      put_body(writer, open, scene, at->place, options, kilograms > 0 ? kilograms : 1);
+      put_body(writer, open, scene, at->place, options, kilograms > 0 ? kilograms : 1, at->kept_prim.is_animated);
     }
     hide_earlier(writer, open, &at->kept_prim);
     put_reference(writer, open, stem, scene->meshes[at->mesh]);

@@ -193,7 +193,7 @@ static qmat_mesh *skin(qmat_context *context, const qmat_medial *medial, double 
   qmat_params_default(node, params);
   if (qmat_param_parse(context, qmat_param_find(node, "resolution"), text, params) != QMAT_OK ||
       qmat_param_parse(context, qmat_param_find(node, "error"), "0", params) != QMAT_OK ||
-      qmat_node_run(context, node, params, (const qmat_value *[]){&medial->base}, outputs) != QMAT_OK)
+      qmat_node_run(context, node, params, (const qmat_value *[]){&medial->base, NULL}, outputs) != QMAT_OK)
     return NULL;
   qmat_value_release(outputs[1]);
   return (qmat_mesh *)outputs[0];

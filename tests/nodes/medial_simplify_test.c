@@ -555,7 +555,7 @@ static qmat_mesh *plant(const planted *shape) {
                    QMAT_OK);
   assert_int_equal(qmat_value_seal(&context, &medial->base), QMAT_OK);
   qmat_value *outputs[PIPELINE_MOST_PORTS];
-  pipeline_must_run(0, "medial.skin", "resolution=64", (const qmat_value *[]){&medial->base}, outputs);
+  pipeline_must_run(0, "medial.skin", "resolution=64", (const qmat_value *[]){&medial->base, NULL}, outputs);
   qmat_value_release(outputs[1]);
   qmat_value_release(&medial->base);
   qmat_context_uninit(&context);

@@ -45,7 +45,7 @@ static qmat_status try_skin(qmat_context *context, qmat_medial *medial, const ch
     assert_non_null(param);
     assert_int_equal(qmat_param_parse(context, param, value, params), QMAT_OK);
   }
-  const qmat_value *inputs[1] = {&medial->base};
+  const qmat_value *inputs[2] = {&medial->base};
   qmat_value *outputs[2] = {NULL, NULL};
   qmat_status status = qmat_params_check(context, node, params);
   if (status == QMAT_OK) status = node->run(context, params, inputs, outputs);
@@ -892,7 +892,7 @@ static void test_a_run_can_be_cancelled(void **unused) {
                                          "method=skin_surface"};
   for (int i = 0; i < 3; i++) {
     qmat_medial *medial = i < 2 ? soup(1) : capsule(0);
-    pipeline_must_be_cancelled("medial.skin", settings[i], (const qmat_value *[]){&medial->base});
+    pipeline_must_be_cancelled("medial.skin", settings[i], (const qmat_value *[]){&medial->base, NULL});
     qmat_value_release(&medial->base);
   }
 }

@@ -281,7 +281,7 @@ static void test_the_skin_of_a_sheet_has_two_sides(void **state) {
   (void)state;
   description d = describe(sheet_of(10, 10, plane), 0);
   qmat_value *outputs[PIPELINE_MOST_PORTS];
-  pipeline_must_run(0, "medial.skin", "", (const qmat_value *[]){&d.medial->base}, outputs);
+  pipeline_must_run(0, "medial.skin", "", (const qmat_value *[]){&d.medial->base, NULL}, outputs);
   const qmat_mesh *skin = (const qmat_mesh *)outputs[0];
   assert_int_equal(skin->triangle_count, 4);
   assert_false(skin->closed);

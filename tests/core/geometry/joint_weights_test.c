@@ -158,12 +158,46 @@ static void test_points_of_the_envelope_follow_the_spheres_beside_them(void **st
   qmat_context_uninit(&context);
 }
 
+static void test_points_near_a_surface_follow_the_corners_beside_them(void **state) {
+  (void)state;
+  qmat_mesh *model = shape_new();
+  const uint32_t corners[] = {shape_vertex(model, 0, 0, 0), shape_vertex(model, 4, 0, 0), shape_vertex(model, 0, 4, 0),
+                              shape_vertex(model, 0, 0, 4)};
+  shape_triangle(model, corners[0], corners[2], corners[1]);
+  shape_triangle(model, corners[0], corners[1], corners[3]);
+  shape_triangle(model, corners[0], corners[3], corners[2]);
+  shape_triangle(model, corners[1], corners[2], corners[3]);
+  model->skinned_count = 4;
+  model->joints = qmat_calloc(16, sizeof *model->joints);
+  model->weights = qmat_calloc(16, sizeof *model->weights);
+  assert_true(model->joints && model->weights);
+  for (uint32_t v = 0; v < 4; v++) model->joints[4 * v] = 10 + v, model->weights[4 * v] = 1;
+  shape_seal(model);
+  static const double points[] = {1, 2, -1, 9, -1, -1, 3, -0.5, 0, -3, 1, 1};
+  static const double expected[4][4] = {{0.25, 0.25, 0.5, 0}, {0, 1, 0, 0}, {0.25, 0.75, 0, 0}, {0.5, 0, 0.25, 0.25}};
+  qmat_mesh *mesh = shape_new();
+  for (size_t v = 0; v < 4; v++) shape_vertex(mesh, points[3 * v], points[3 * v + 1], points[3 * v + 2]);
+  qmat_context context = {.threads = 2};
+  assert_int_equal(qmat_joints_of_surface(&context, model, mesh), QMAT_OK);
+  assert_int_equal(mesh->skinned_count, 4);
+  for (size_t v = 0; v < 4; v++)
+    for (uint32_t joint = 0; joint < 4; joint++) {
+      double found = 0;
+      for (size_t k = 4 * v; k < 4 * v + 4; k++) found += mesh->joints[k] == 10 + joint ? mesh->weights[k] : 0;
+      assert_near(found, expected[v][joint], 1e-12);
+    }
+  qmat_value_release(&model->base);
+  qmat_value_release(&mesh->base);
+  qmat_context_uninit(&context);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_the_strongest_four_are_kept_and_sum_to_one),
       cmocka_unit_test(test_a_turn_of_a_joint_moves_the_spheres_of_its_side),
       cmocka_unit_test(test_a_mesh_without_a_skin_leaves_spheres_as_they_are),
       cmocka_unit_test(test_points_of_the_envelope_follow_the_spheres_beside_them),
+      cmocka_unit_test(test_points_near_a_surface_follow_the_corners_beside_them),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

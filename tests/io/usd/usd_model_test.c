@@ -820,6 +820,55 @@ static void test_prims_with_colliders_are_bodies_with_the_mass_of_their_place(vo
   release(&r);
 }
 
+/* A simulator would let a dynamic body fall off its animation. */
+static void test_bodies_that_an_animation_moves_are_kinematic(void **state) {
+  (void)state;
+#define MOVES(operation, other)                                        \
+  "double3 " operation ".timeSamples = { 0: (0, 0, 0), 24: (0, " other \
+  ", 0) }\nuniform token[] xformOpOrder = [\"" operation "\"]\n"
+  reading r = read_all(
+      "#usda 1.0\n()\n" CUBE("still", AT(1, 0, 0))
+          CUBE("own", MOVES("xformOp:translate", "3")) "def Xform \"carrier\" { " MOVES("xformOp:translate:way", "1")
+              CUBE("carried", "") CUBE("freed", "uniform token[] xformOpOrder = [\"!resetXformStack!\"]\n") "}\n" CUBE(
+                  "sampled", MOVES("xformOp:translate", "0")) /* a sample per frame of what stays */
+      CUBE("back",
+           "double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 24: (0, 1, 0) }\n"
+           "uniform token[] xformOpOrder = [\"!invert!xformOp:translate\"]\n")
+          CUBE("unused", "double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 24: (0, 1, 0) }\n"));
+#undef MOVES
+  static const struct {
+    const char *over;
+    bool is_kinematic;
+  } expected[] = {{"over \"still\"", false}, {"over \"own\"", true},      {"over \"carried\"", true},
+                  {"over \"freed\"", false}, {"over \"sampled\"", false}, {"over \"back\"", true},
+                  {"over \"unused\"", false}};
+  qmat_medial *medial = example_medial(1);
+  double body[10] = {2, 1, 2, 3, 5, 4, 3, 0, 0, 0};
+  const qmat_colliders colliders = {.body_count = 1, .body = body};
+  for (int form = QMAT_USD_TEXT; form <= QMAT_USD_CRATE; form++) {
+    const qmat_usd_addition addition = {.medial = medial,
+                                        .options = {.form = (qmat_usd_form)form,
+                                                    .moved = 1e-3,
+                                                    .errors = {.meters_per_unit = 1},
+                                                    .dynamic = true,
+                                                    .colliders = &colliders}};
+    qmat_file *file;
+    assert_int_equal(r.scene->mesh_count, 1);
+    assert_int_equal(qmat_usd_write_layer(&r.context, r.scene, &addition, 1, NULL, &file), QMAT_OK);
+    char *text = form == QMAT_USD_TEXT ? text_of(file) : NULL;
+    for (size_t i = 0; text && i < sizeof expected / sizeof *expected; i++) {
+      const char *over = strstr(text, expected[i].over), *mass = strstr(over, "physics:mass"),
+                 *kinematic = strstr(over, "bool physics:kinematicEnabled = true\n");
+      assert_true(over && mass);
+      assert_int_equal(kinematic != NULL && kinematic < strstr(mass, "}"), expected[i].is_kinematic);
+    }
+    qmat_free(text);
+    qmat_value_release(&file->base);
+  }
+  qmat_value_release(&medial->base);
+  release(&r);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_names_of_added_prims_are_new_and_earlier_medial_meshes_are_hidden),
@@ -841,6 +890,7 @@ int main(void) {
       cmocka_unit_test(test_additions_of_layers_that_a_scene_refers_to_are_hidden),
       cmocka_unit_test(test_a_shape_of_a_variant_is_named_when_a_layer_is_written),
       cmocka_unit_test(test_prims_with_colliders_are_bodies_with_the_mass_of_their_place),
+      cmocka_unit_test(test_bodies_that_an_animation_moves_are_kinematic),
       cmocka_unit_test(test_a_transform_is_split_into_a_rotation_and_a_plain_one),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -352,7 +352,7 @@ static void test_a_thin_plate_keeps_a_sphere_that_has_a_skin(void **state) {
   qmat_value *outputs[PIPELINE_MOST_PORTS];
   assert_int_equal(pipeline_features(s.simple), 8);
   assert_true(s.simple->sphere_count > 8);
-  pipeline_must_run(0, "medial.skin", "", (const qmat_value *[]){&s.simple->base}, outputs);
+  pipeline_must_run(0, "medial.skin", "", (const qmat_value *[]){&s.simple->base, NULL}, outputs);
   for (size_t i = 0; i < qmat_output_count(qmat_node_find("medial.skin")); i++) qmat_value_release(outputs[i]);
   release(&s);
 }
