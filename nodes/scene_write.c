@@ -623,7 +623,7 @@ static const qmat_library *const libraries[] = {&qmat_library_draco, NULL};
 
 const qmat_node qmat_node_scene_write = {
     .name = "scene.write",
-    .version = 24,
+    .version = 25,
     .summary = "Makes a file of a medial mesh and its skin, or adds medial meshes to a glTF scene",
     .doc =
         "A glTF scene from scene.read is written back whole, as glb or gltf: the extras of the nodes that carry a mesh "
