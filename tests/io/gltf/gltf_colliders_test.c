@@ -405,11 +405,12 @@ static void test_usd_has_a_capsule_of_two_radii_and_convex_hulls(void **state) {
   (void)state;
   qmat_colliders *c = example();
   qmat_writer writer = {0};
-  qmat_usd_put_body(&writer, 1, c->body, (const double[]){1, 0, 0}, 1);
+  qmat_usd_put_body(&writer, 1, c->body, (const double[]){1, 0, 0}, 1, true);
   qmat_usd_put_colliders(&writer, c, (const double[]){1, 0, 0});
   qmat_put_u8(&writer, 0);
   const char *text = (const char *)writer.bytes;
   assert_non_null(strstr(text, "physics:centerOfMass = (0, 2, 3)"));
+  assert_non_null(strstr(text, "bool physics:kinematicEnabled = true"));
   assert_non_null(strstr(text, "double radiusBottom = 0.5\n            double radiusTop = 0.25"));
   assert_non_null(strstr(text, "double3 xformOp:translate = (1.5, 2, 3)"));
   assert_non_null(strstr(text, "physics:approximation = \"convexHull\""));
