@@ -600,7 +600,7 @@ class MedialMesh(Medial):
 
     def envelope(self, *, threads=0, progress=None, **parameters):
         """The envelope as a Mesh: parameters are those of the node medial.skin."""
-        graph = self._continue(Graph(cache=self._cache), ["simple.medial"])
+        graph = self._continue(Graph(cache=self._cache), ["solid.mesh", "simple.medial"])
         graph.set({f"skin.{name}": value for name, value in parameters.items()})
         return graph.run("skin.mesh", threads=threads, progress=progress)["skin.mesh"]
 

@@ -5,10 +5,10 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <time.h>
 
 #include <cmocka.h>
 
+#include "tests/cpu_time.h"
 #include "tests/medial_meshes.h"
 #include "tests/nodes/pipeline.h"
 
@@ -20,9 +20,7 @@ typedef struct gaps {
 } gaps;
 
 static void note_gap(gaps *between) {
-  struct timespec time;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  const double now = (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+  const double now = cpu_time();
   if (between->last > 0 && now - between->last > between->longest) between->longest = now - between->last;
   between->last = now;
 }

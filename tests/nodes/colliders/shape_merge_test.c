@@ -8,10 +8,10 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
-#include <time.h>
 
 #include <cmocka.h>
 
+#include "tests/cpu_time.h"
 #include "tests/random.h"
 
 enum { MOST = 8 };
@@ -115,14 +115,13 @@ static void test_the_cheapest_pair_is_joined_each_time(void **state) {
 }
 
 static double seconds_for(size_t count) {
-  struct timespec start, end;
   qmat_context context = {.threads = 1};
   qmat_shape_set set = random_spheres(&context, count, 0.5 / cbrt((double)count));
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &start);
+  const double start = cpu_time();
   assert_int_equal(qmat_shape_set_merge(&context, &set, QMAT_SHAPES_SPHERES, 1, count / 2), QMAT_OK);
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &end);
+  const double seconds = cpu_time() - start;
   qmat_context_uninit(&context);
-  return (double)(end.tv_sec - start.tv_sec) + 1e-9 * (double)(end.tv_nsec - start.tv_nsec);
+  return seconds;
 }
 
 /* Looks at all pairs for each pair that is joined would take 64 times as long for four times as many shapes. */

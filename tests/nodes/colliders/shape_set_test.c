@@ -6,10 +6,10 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <time.h>
 
 #include <cmocka.h>
 
+#include "tests/cpu_time.h"
 #include "tests/random.h"
 #include "tests/shortage.h"
 
@@ -62,14 +62,13 @@ static void test_what_stays_is_in_no_other_shape(void **state) {
 }
 
 static double seconds_for(size_t count) {
-  struct timespec start, end;
   qmat_context context = {.threads = 1};
   qmat_shape_set set = random_spheres(&context, count, 0.2 / cbrt((double)count));
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &start);
+  const double start = cpu_time();
   assert_int_equal(qmat_shape_set_reduce(&context, &set), QMAT_OK);
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &end);
+  const double seconds = cpu_time() - start;
   qmat_context_uninit(&context);
-  return (double)(end.tv_sec - start.tv_sec) + 1e-9 * (double)(end.tv_nsec - start.tv_nsec);
+  return seconds;
 }
 
 /* Looks at all pairs of eight times as many shapes would take 64 times as long. */
