@@ -51,9 +51,9 @@ const qmat_node qmat_node_medial_delaunay = {
     .doc =
         "Every tetrahedron inside the solid becomes a medial vertex. Its centre is the circumcentre if that is inside. "
         "Otherwise it is the incentre, with the distance to the surface as radius; this completes parts that are too "
-        "thin for circumcentres, but not for long flat tetrahedra on the surface, as a cylinder of hundreds of facets "
-        "has "
-        "them. Medial edges are dual to the facets between such tetrahedra, and medial slabs to the "
+        "thin for circumcentres. Long slivers on the surface are left out: a cylinder of hundreds of facets has "
+        "thousands. "
+        "Medial edges are dual to the facets between such tetrahedra, and medial slabs to the "
         "Delaunay edges that they surround.\n\n"
         "A sliver on the surface can be on the wrong side of it, and where thin walls meet, tetrahedra between the "
         "samples of both are outside. That makes loops and voids, or opens voids. Where incentres is all, the "

@@ -78,19 +78,20 @@ static bool is_delaunay_sphere(const qmat_dual_complex *d, size_t cell, const do
   return true;
 }
 
-/* The least length of a chip, in reaches of samples that represent others. Delaunay neighbours among the samples that
- * stay are at most two reaches apart, unless the samples of a narrow facet represent those of its neighbours. */
-static const double least_chip_length = 3;
+/* The least length of a surface sliver, in reaches of samples that represent others. Delaunay neighbours among the
+ * samples that stay are at most two reaches apart, unless the samples of a narrow facet represent those of its
+ * neighbours. */
+static const double least_sliver_length = 3;
 
-/* Whether a tetrahedron is a chip of the surface: its corners are samples of a patch that is flat up to the thinning
+/* Whether a tetrahedron is a sliver on the surface: its corners are samples of a piece that is flat up to the thinning
  * tolerance, and one of its edges is long. The samples of a cylinder with many narrow facets make thousands, since
  * those of an edge that is not triangulated stick out of the facets between its neighbours. */
-static bool is_chip(const qmat_dual_complex *d, const uint32_t *corners, const double *const p[4]) {
+static bool is_surface_sliver(const qmat_dual_complex *d, const uint32_t *corners, const double *const p[4]) {
   const double *positions = qmat_surface_positions(d->surface);
   double normals[4][3], longest = 0;
   for (size_t a = 0; a < 4; a++)
     for (size_t b = 0; b < a; b++) longest = fmax(longest, qmat_point_distance(p[a], p[b]));
-  if (longest < least_chip_length * qmat_longest_reach) return false;
+  if (longest < least_sliver_length * qmat_longest_reach) return false;
   for (size_t k = 0; k < 4; k++) {
     const uint32_t *ids = &d->mesh->triangles[3 * (size_t)d->facets[corners[k]]];
     (void)qmat_triangle_area(&positions[3 * (size_t)ids[0]], &positions[3 * (size_t)ids[1]],
@@ -126,7 +127,7 @@ static qmat_cell_kind select_medial_vertex(const qmat_dual_complex *d, size_t ce
       return QMAT_CELL_CIRCUMCENTRE;
     }
   }
-  if (!in_solid || is_chip(d, corner, p)) return QMAT_CELL_DROPPED;
+  if (!in_solid || is_surface_sliver(d, corner, p)) return QMAT_CELL_DROPPED;
   memcpy(sphere, centre, sizeof centre);
   sphere[3] = qmat_surface_distance(d->surface, centre, INFINITY, NULL, NULL);
   return QMAT_CELL_INCENTRE;

@@ -8,8 +8,8 @@
  * rounding and make flat tetrahedra on the surface, whose side would depend on chance. */
 static const double qmat_least_depth = 1e-8;
 
-/* Algorithm 1: sets `kinds` and `spheres` of every tetrahedron. Long flat tetrahedra between samples of one nearly flat
- * patch are dropped, unless their circumcentre is inside. Reads `points`, `thin`, `cells` and
+/* Algorithm 1: sets `kinds` and `spheres` of every tetrahedron. Long slivers between samples of one nearly flat
+ * piece of the surface are dropped, unless their circumcentre is inside. Reads `points`, `thin`, `cells` and
  * `solids`. QMAT_ERROR_MEMORY, QMAT_CANCELLED. All threads; the result does not depend on their number. */
 qmat_status qmat_medial_vertices_select(qmat_dual_complex *dual);
 

@@ -554,7 +554,7 @@ static void test_radius_by_distance_stays_inside_and_circumradius_is_no_smaller(
   pipeline_free(&p);
 }
 
-/* A cylinder of facets narrower than the distance between samples: long flat tetrahedra on its surface are left out. */
+/* A cylinder of facets narrower than the distance between samples: long slivers on its surface are left out. */
 static void test_narrow_facets_have_few_incentres(void **state) {
   (void)state;
   pipeline p;
