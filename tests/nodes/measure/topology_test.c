@@ -348,6 +348,18 @@ static void test_flat_shells_beside_open_sheets_enclose_no_void(void **state) {
   }
 }
 
+/* A thin ring without one of its triangles is open: it has the two loops of its surface, and bounds no solid. */
+static void test_open_sheets_are_no_thin_solids(void **state) {
+  (void)state;
+  qmat_mesh *mesh = shape_torus(3, 1, 12, 8);
+  for (size_t v = 0; v < mesh->vertex_count; v++) mesh->positions[3 * v + 2] *= 1e-7;
+  mesh->triangle_count--;
+  shape_add_box(mesh, 5, 0, -0.5, 6, 1, 0.5, false);
+  mesh->sheet_triangle_count = mesh->triangle_count;
+  mesh->sheet_thickness = 1e-3;
+  check_solid(mesh, 2, 2, 1);
+}
+
 /* ---- cancels ---- */
 
 /* Cancels at the first report in one unit. */
@@ -440,6 +452,7 @@ int main(void) {
       cmocka_unit_test(test_nothing_is_said_of_open_and_branching_surfaces),
       cmocka_unit_test(test_flat_shells_of_sheets_enclose_no_void),
       cmocka_unit_test(test_flat_shells_beside_open_sheets_enclose_no_void),
+      cmocka_unit_test(test_open_sheets_are_no_thin_solids),
       cmocka_unit_test(test_long_loops_over_a_solid_obey_a_cancel),
       cmocka_unit_test(test_long_loops_over_a_medial_mesh_obey_a_cancel),
   };
