@@ -81,7 +81,7 @@ static bool is_delaunay_sphere(const qmat_dual_complex *d, size_t cell, const do
 /* The least length of a surface sliver, in reaches of samples that represent others. Delaunay neighbours among the
  * samples that stay are at most two reaches apart, unless the samples of a narrow facet represent those of its
  * neighbours. */
-static const double least_sliver_length = 3;
+static const double least_sliver_length = 6;
 
 /* Whether a tetrahedron is a sliver on the surface: its corners are samples of a piece that is flat up to the thinning
  * tolerance, and one of its edges is long. The samples of a cylinder with many narrow facets make thousands, since
